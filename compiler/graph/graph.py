@@ -1,0 +1,178 @@
+"""The cyclic object-instancing graph (paper, section 2): what a scene is between its text and its bytecode.
+
+Nodes stand in one list and refer to each other by index; node 0 is the root. Each class below is one node kind
+of runtime/bytecode.toml, with its fields in that order, so that the encoder is a loop over the table. An
+``Enter`` node is the edge back to a Selection's S-node and the only way to make a cycle. Expressions, steps and
+statements stay symbolic (``reading.model``); the encoder makes code of them.
+
+``str(graph)`` prints it, one node a line, reachable or not::
+
+    0 object Tree 0 -> 1
+    1 calculate C_initialize { cntTree = 10; cntTrunk = 2; betaBr = 60 } -> 2
+    2 enter -> 3
+    3 symbol Tree [cntTree cntTrunk betaBr] -> 4
+    4 branch (cntTrunk > 0) then 5 else 11
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Iterator
+
+from ..reading.model import Assign, Expression, Mesh, Record, Step, TextureValue, Variants
+from ..reading.source import Span
+
+
+@dataclass(slots=True)
+class Node:
+    span: Span | None = field(default=None, kw_only=True, compare=False, repr=False)
+
+    def children(self) -> tuple[int, ...]:
+        """The nodes that this one refers to, in the order of derivation (an Enter's symbol is one)."""
+        found: list[int] = []
+        for f in fields(self):
+            if f.name in ("child", "body", "then", "otherwise", "symbol"):
+                found.append(getattr(self, f.name))
+            elif f.name == "children_":
+                found.extend(self.children_)
+            elif f.name == "cases":
+                found.extend(body for _, body in self.cases)
+        return tuple(found)
+
+
+@dataclass(slots=True)
+class Empty(Node):
+    pass
+
+
+@dataclass(slots=True)
+class Symbol(Node):
+    """S-node. ``live`` and ``draws`` are filled by the liveness pass: the parameters (names, in slot order) and
+    whether the random key matters for the geometry below."""
+
+    name: str
+    body: int
+    live: tuple[str, ...] = ()
+    draws: bool = False
+
+
+@dataclass(slots=True)
+class Rule(Node):
+    index: int
+    body: int
+
+
+@dataclass(slots=True)
+class Branch(Node):
+    test: Expression
+    then: int
+    otherwise: int
+
+
+@dataclass(slots=True)
+class Choose(Node):
+    cases: tuple[tuple[Expression, int], ...]
+
+
+@dataclass(slots=True)
+class Calculate(Node):
+    name: str
+    statements: tuple[Assign | Variants, ...]
+    child: int
+    together: bool = False
+
+
+@dataclass(slots=True)
+class Transform(Node):
+    """A constant transformation: ``matrix`` is the 3x4 matrix row by row, 12 doubles, p' = M·(p, 1)."""
+
+    name: str
+    matrix: tuple[float, ...]
+    child: int
+
+
+@dataclass(slots=True)
+class TransformCode(Node):
+    name: str
+    steps: tuple[Step, ...]
+    child: int
+
+
+@dataclass(slots=True)
+class Texture(Node):
+    name: str
+    texture: TextureValue
+    child: int
+    draws: bool = False
+
+
+@dataclass(slots=True)
+class Union(Node):
+    children_: tuple[int, ...]
+
+
+@dataclass(slots=True)
+class Enter(Node):
+    symbol: int
+
+
+@dataclass(slots=True)
+class Primitive(Node):
+    shape: str
+    arguments: tuple[Expression, ...] = ()
+
+
+@dataclass(slots=True)
+class MeshLeaf(Node):
+    mesh: int
+
+
+@dataclass(slots=True)
+class Object(Node):
+    name: str
+    ordinal: int
+    child: int
+
+
+@dataclass(slots=True)
+class NoShadow(Node):
+    child: int
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """Something a pass removed because the scene doesn't need it: shown by ``--explain`` and in JSON."""
+
+    what: str
+    why: str
+
+
+@dataclass
+class Graph:
+    nodes: list[Node] = field(default_factory=list)
+    parameters: list[str] = field(default_factory=list)  # slot order
+    settings: Record | None = None
+    camera: Record | None = None
+    lights: list[Record] = field(default_factory=list)
+    meshes: list[Mesh] = field(default_factory=list)
+    left_out: list[LeftOut] = field(default_factory=list)
+
+    def add(self, node: Node) -> int:
+        self.nodes.append(node)
+        return len(self.nodes) - 1
+
+    def reachable(self, start: int = 0) -> Iterator[int]:
+        """Node indices reachable from ``start``, each once, depth first in derivation order (start first)."""
+        seen, stack = set(), [start]
+        while stack:
+            i = stack.pop()
+            if i in seen:
+                continue
+            seen.add(i)
+            yield i
+            stack.extend(reversed(self.nodes[i].children()))
+
+    def __str__(self) -> str:
+        from .printing import print_graph
+
+        return print_graph(self)

@@ -1,0 +1,267 @@
+"""The checked model: a scene whose every name has a meaning.
+
+``resolve.resolve(file, …) -> Model`` makes it from the syntax tree, ``check.check(model)`` looks for scenes that
+can't work, and ``graph.lower`` turns it into the cyclic graph. Constants (``#declare`` numbers, ``Parameter``
+inputs, ``pi``) are already values here; what remains symbolic is what changes along a derivation.
+
+Example: ``betaBr -= 4.0;`` is
+``Assign('betaBr', Apply('subtract', (Read('betaBr'), Constant(4.0))))``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .source import Source, Span
+
+# --- expressions: over doubles ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    value: float
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """The value of a parameter on the derivation's path."""
+
+    parameter: str
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Apply:
+    """``operation`` is an opcode's name in runtime/bytecode.toml (``add``, ``less``, ``sin``, ``rand``, ``hash`` …)
+    or one of ``and``, ``or``, ``select`` (test, then, otherwise), which evaluate only what they need."""
+
+    operation: str
+    arguments: tuple[Expression, ...]
+    span: Span | None = field(default=None, compare=False)
+
+
+Expression = Constant | Read | Apply
+
+
+# --- operators ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Assign:
+    parameter: str
+    value: Expression
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Variants:
+    """``variants n;``: the random key becomes one of n."""
+
+    count: Expression
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Calculate:
+    """``name`` is '' for inline ones and symbol arguments. With ``together`` all values are evaluated before
+    the first is assigned (symbol arguments)."""
+
+    name: str
+    statements: tuple[Assign | Variants, ...]
+    together: bool = False
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One line of a Transformation: ``operation`` is an opcode's name (trans rotx roty rotz rot scale
+    scale_uniform shear matrix)."""
+
+    operation: str
+    arguments: tuple[Expression, ...]
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """Steps compose like local frames: the last acts on the object first, M = step0 · step1 · …"""
+
+    name: str
+    steps: tuple[Step, ...]
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class TextureValue:
+    """A whole texture: ``values`` by name of the texture record in runtime/bytecode.toml (only what is set;
+    ``pattern`` is a Constant with the pattern's id), ``entries`` of six expressions each
+    (position, red, green, blue, filter, transmit)."""
+
+    values: tuple[tuple[str, tuple[Expression, ...]], ...]
+    entries: tuple[tuple[Expression, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Paint:
+    """A texture operator, or a scene object's texture."""
+
+    name: str
+    texture: TextureValue
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class NoShadow:
+    span: Span | None = field(default=None, compare=False)
+
+
+Operator = Calculate | Transform | Paint | NoShadow
+
+
+# --- operands and productions -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Enter:
+    """A reference to a Selection. Arguments and entry action stand before it as Calculate operators."""
+
+    symbol: str
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Primitive:
+    """``shape`` is a shape's name in runtime/bytecode.toml; arguments in its order."""
+
+    shape: str
+    arguments: tuple[Expression, ...] = ()
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class MeshLeaf:
+    """An index into ``Model.meshes``."""
+
+    mesh: int
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Prefixed:
+    operator: Operator
+    operand: Operand
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """Two or more terms of a union."""
+
+    terms: tuple[Operand, ...]
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Empty:
+    span: Span | None = field(default=None, compare=False)
+
+
+Operand = Enter | Primitive | MeshLeaf | Prefixed | Sum | Empty
+
+
+@dataclass(frozen=True, slots=True)
+class Produce:
+    """A production's right-hand side; ``rule`` counts the scene's rules in source order from 0."""
+
+    rule: int
+    body: Operand
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    test: Expression
+    then: Production
+    otherwise: Production  # Empty where no rule applies
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Choose:
+    cases: tuple[tuple[Expression, Produce], ...]
+    span: Span | None = field(default=None, compare=False)
+
+
+Production = Produce | Branch | Choose | Empty
+
+
+# --- the scene -------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    name: str
+    production: Production
+    span: Span
+    name_span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """``vertices`` (n, 3) float64, ``normals`` (m, 3) float64 or (0, 3), ``triangles`` (k, 3) vertex indices,
+    ``normal_triangles`` (k, 3) normal indices or (0, 3); NumPy arrays."""
+
+    name: str
+    vertices: object
+    normals: object
+    triangles: object
+    normal_triangles: object
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Camera, light or settings: ``kind`` and ``values`` as in runtime/bytecode.toml's records; only what is set."""
+
+    kind: str
+    values: tuple[tuple[str, tuple[float, ...]], ...]
+    span: Span | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class SceneObject:
+    """One placed object. ``symbol`` is the start symbol's name or ''; ``ordinal`` counts the objects that
+    place it, from 0. ``body`` holds modifiers as operators, outermost first (the last modifier is outermost)."""
+
+    symbol: str
+    ordinal: int
+    body: Operand
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """``Parameter name = default [low to high] "text";`` with the value that this compilation uses."""
+
+    name: str
+    value: float
+    default: float
+    low: float | None
+    high: float | None
+    text: str
+    span: Span
+
+
+@dataclass
+class Model:
+    source: Source
+    files: list[Path] = field(default_factory=list)  # every file read, the scene's first
+    settings: Record | None = None
+    camera: Record | None = None
+    lights: list[Record] = field(default_factory=list)
+    objects: list[SceneObject] = field(default_factory=list)
+    symbols: dict[str, Symbol] = field(default_factory=dict)
+    parameters: list[str] = field(default_factory=list)  # assigned names, in order of first appearance
+    meshes: list[Mesh] = field(default_factory=list)
+    inputs: list[Input] = field(default_factory=list)

@@ -1,0 +1,85 @@
+/* trace.h - from a ray to a hit, and from a hit to the surface that shading needs.
+ *
+ * shade.c sees the scene only through this file. A tracer is one thread's working memory (stacks, counters) over an
+ * immutable scene. Rays are in world space; directions need not be unit length. A hit is *normative* (see
+ * DESIGN in ARCHITECTURE.md): its t was evaluated level by level along the derivation path, so it is the same
+ * for every accelerator and thread. */
+#ifndef PL_TRACE_H
+#define PL_TRACE_H
+
+#include "bytecode.h" /* generated: PL_TEXTURE_… value offsets, sizes and defaults */
+#include "plsys.h"
+
+typedef struct pl_tracer pl_tracer;
+
+typedef struct pl_ray {
+    double origin[3], direction[3];
+    double t_min, t_max; /* hits at t_min < t < t_max count */
+    bool shadow;         /* skip what stands below no_shadow */
+} pl_ray;
+
+/* A point on a derivation path: union term indices from the root, owned by the hit (grown as needed). */
+typedef struct pl_path {
+    uint32_t *terms;
+    uint32_t length, capacity;
+} pl_path;
+
+typedef struct pl_hit {
+    double t;           /* INFINITY: none */
+    double bound;       /* error bound of t; NaN until known */
+    uint64_t primitive; /* index in derivation order */
+    int32_t part;       /* of the shape: a face, or a mesh's triangle */
+    pl_path path;
+} pl_hit;
+
+/* What shading needs to know of a hit, found by walking its path once more with all parameters. */
+typedef struct pl_surface {
+    double point[3];         /* world: origin + t * direction */
+    double normal[3];        /* world, unit, as the shape has it (smooth where the mesh is) */
+    const double *texture;   /* PL_TEXTURE_VALUES numbers, then entries; valid until the tracer's next surface call */
+    uint32_t entries;
+    double pattern_point[3]; /* the hit point in the frame where the texture stands (before its own matrix) */
+    int32_t symbol, rule, depth;
+} pl_surface;
+
+pl_tracer *pl_tracer_create(const pl_scene *scene, pl_error *error);
+void pl_tracer_destroy(pl_tracer *tracer);
+
+void pl_hit_init(pl_hit *hit);
+void pl_hit_free(pl_hit *hit);
+
+/* The foremost hit (ties: first in path order). false: an error (hit->t is then INFINITY). */
+bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_error *error);
+
+/* Whether anything stands between t_min and t_max: -1 error, 0 no, 1 yes. */
+int pl_trace_any(pl_tracer *tracer, const pl_ray *ray, pl_error *error);
+
+/* Calls visit with every hit between t_min and t_max, in (t, path) order, until it returns false; for the shadows of
+ * transparent things. A solid gives each of its roots. false: an error. */
+bool pl_trace_all(pl_tracer *tracer, const pl_ray *ray, bool (*visit)(void *context, const pl_hit *hit), void *context,
+                  pl_error *error);
+
+bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface, pl_error *error);
+
+/* The tracer's counters of the last primary ray (for the extra channels) and totals. */
+typedef struct pl_counters {
+    uint64_t box_tests, primitive_tests;
+    uint32_t miss_depth; /* deepest recursion depth at which a box was missed, since last reset */
+} pl_counters;
+pl_counters *pl_tracer_counters(pl_tracer *tracer);
+
+/* Records (arrays of PL_…_VALUES numbers, defaults filled in). */
+const double *pl_scene_settings(const pl_scene *scene);
+const double *pl_scene_camera(const pl_scene *scene); /* NULL: the scene has none */
+uint32_t pl_scene_lights(const pl_scene *scene, const double *const **lights);
+bool pl_scene_all_opaque(const pl_scene *scene); /* no texture filters or transmits, or could */
+bool pl_scene_povray_epsilon(const pl_scene *scene);
+int pl_scene_threads(const pl_scene *scene);
+/* Adds a tracer's counters and ray counts to the scene's statistics; safe from any thread. */
+typedef struct pl_ray_counts {
+    uint64_t primary, shadow, reflection, transmitted, bailout, trace_level;
+} pl_ray_counts;
+void pl_scene_count(pl_scene *scene, const pl_tracer *tracer, const pl_ray_counts *rays);
+void pl_scene_count_seconds(pl_scene *scene, double trace);
+
+#endif
