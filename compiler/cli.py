@@ -1,0 +1,86 @@
+"""The command line: ``plsys COMMAND …``.
+
+Each command is a module of ``plsys.compiler.commands`` with ``SUMMARY``, ``add_arguments(parser)`` and
+``run(arguments) -> exit code``; only the one that is asked for is imported. Exit codes: 0 fine, 1 a check failed or
+pictures differ, 2 bad input (with a message on stderr and no output file).
+
+Example: ``plsys render scenes/tree.plsys -o tree.png``
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+
+COMMANDS = {
+    "render": "draw a scene",
+    "check": "diagnostics, and how many primitives a scene has, without unfolding it",
+    "compile": "write the bytecode (.plsb) that `render` and `plsys-rt` read",
+    "export": "write the unfolded scene for POV-Ray (.pov) or as a mesh (.obj)",
+    "compare": "draw a scene here and in POV-Ray and compare the pictures",
+    "graph": "draw the cyclic object-instancing graph (.svg, .dot)",
+    "disassemble": "show the bytecode as text",
+}
+
+EPILOG = """\
+examples:
+  plsys render scenes/tree.plsys -o tree.png --size 800x600
+  plsys render scenes/tree.plsys -o old.png -D order=14
+  plsys check scenes/*.plsys
+  plsys compare scenes/tree.plsys -o difference.png
+
+`plsys COMMAND --help` explains a command. Every command takes --json.
+exit codes: 0 fine, 1 a check failed or pictures differ, 2 bad input."""
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command; the process's exit code."""
+    argv = sys.argv[1:] if argv is None else argv
+    parser = _parser(argv[0] if argv else None)
+    arguments = parser.parse_args(argv)
+    if not arguments.command:
+        parser.print_help()
+        return 2
+    from .commands.common import report_errors
+
+    return report_errors(arguments, lambda: arguments.run(arguments))
+
+
+def _parser(command: str | None) -> argparse.ArgumentParser:
+    """The parser of all commands, with the options of ``command`` only: the others stay unimported."""
+    parser = argparse.ArgumentParser(
+        prog="plsys",
+        description="A scene language and renderer for things that grow and repeat.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action=_Version)
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
+    for name, summary in COMMANDS.items():
+        if name != command:
+            subparsers.add_parser(name, help=summary, add_help=False)
+            continue
+        module = importlib.import_module(f".commands.{name}", __package__)
+        sub = subparsers.add_parser(
+            name, help=summary, description=module.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        )
+        module.add_arguments(sub)
+        sub.add_argument("--json", action="store_true", help="print the facts as one JSON object")
+        sub.set_defaults(run=module.run)
+    return parser
+
+
+class _Version(argparse.Action):
+    def __init__(self, option_strings, dest, **_):
+        super().__init__(option_strings, dest, nargs=0, help="the version, and exit")
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        from importlib.metadata import version
+
+        print(f"plsys {version('plsys')}")
+        parser.exit()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

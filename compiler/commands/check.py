@@ -1,0 +1,104 @@
+"""Check scenes: diagnostics, and a forecast of what they unfold to, without unfolding them.
+
+Exit code 2 if a scene has errors; warnings and infos don't change it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from ..reading.diagnostics import PlsysError, SceneError
+from .common import add_input_arguments, json_integer, print_json, read_source, show_diagnostics
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scenes", metavar="SCENE", nargs="+", help=".plsys files")
+    add_input_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    files = [_check(path, arguments) for path in arguments.scenes]
+    if arguments.json:
+        print_json({"files": [file for file, _ in files]})
+    return 2 if any(failed for _, failed in files) else 0
+
+
+def _check(path: str, arguments: argparse.Namespace) -> tuple[dict, bool]:
+    """The JSON entry of one file, and whether it has errors."""
+    from ..graph.forecast import forecast
+    from ..pipeline import build
+
+    prediction = None
+    try:
+        source = read_source(path)
+        compilation = build(source, parameters=dict(arguments.parameters), seed=arguments.seed)
+        prediction = forecast(compilation.graph)
+        diagnostics = [*compilation.diagnostics, *prediction.diagnostics]
+        prediction_json = _forecast_json(prediction, len(compilation.encode()))
+    except SceneError as error:
+        diagnostics, prediction_json = list(error.diagnostics), None
+    except PlsysError as error:
+        if not arguments.json:
+            print(f"{error.place}: error: {error.reason}", file=sys.stderr)
+        entry = {"code": "unreadable", "severity": "error", "message": error.reason, "line": 1, "column": 1}
+        return {
+            "path": path,
+            "diagnostics": [{**entry, "end_line": 1, "end_column": 1, "hint": ""}],
+            "forecast": None,
+        }, True
+    failed = any(d.severity == "error" for d in diagnostics)
+    if not arguments.json:
+        show_diagnostics(diagnostics)
+        if prediction is not None and not failed:
+            print(f"{path}: {_sentence(prediction)}")
+    rows = [{key: value for key, value in d.as_json().items() if key != "path"} for d in diagnostics]
+    return {"path": path, "diagnostics": rows, "forecast": None if failed else prediction_json}, failed
+
+
+def _forecast_json(prediction, bytecode_bytes: int) -> dict:
+    low, expected, high = prediction.primitives_range
+    return {
+        "primitives": json_integer(prediction.primitives),
+        "by_kind": {kind: json_integer(count) for kind, count in prediction.by_kind.items()},
+        "primitives_range": {
+            "low": json_integer(low),
+            "expected": expected if isinstance(expected, float) else json_integer(expected),
+            "high": json_integer(high),
+        },
+        "states": json_integer(prediction.states),
+        "depth": prediction.depth,
+        "infinite": prediction.infinite,
+        "bytecode_bytes": bytecode_bytes,
+    }
+
+
+def _sentence(prediction) -> str:
+    """``2,049 cylinders, 13 states, depth 13``"""
+    low, expected, high = prediction.primitives_range
+    if prediction.infinite:
+        counts = "endless (ended by the detail cut-off)"
+    elif prediction.primitives is None:
+        counts = f"{_short(low)} to {_short(high)} primitives, about {_short(expected)} expected"
+    else:
+        kinds = prediction.by_kind or {"primitive": prediction.primitives}
+        counts = " and ".join(f"{_short(n)} {_plural(kind, n)}" for kind, n in kinds.items())
+    states = "states not counted" if prediction.states is None else f"{prediction.states:,} states"
+    return f"{counts}, {states}, depth {prediction.depth:,}"
+
+
+def _plural(kind: str, count: int) -> str:
+    if count == 1:
+        return kind
+    return {"box": "boxes", "torus": "tori", "mesh": "meshes"}.get(kind, kind + "s")
+
+
+def _short(count: float | int | None) -> str:
+    """An integer with thousands' commas; a long one as its leading digits and its length."""
+    if count is None:
+        return "unboundedly many"
+    if isinstance(count, float):
+        return f"{count:,.0f}"
+    text = f"{count:,}"
+    digits = str(count)
+    return text if len(digits) <= 21 else f"{digits[0]}.{digits[1:4]}e{len(digits) - 1} ({len(digits)} digits)"
