@@ -1,0 +1,139 @@
+/* program.h - bytecode in memory: what a file says, decoded, checked and ready to be derived.
+ *
+ *     pl_program *program = pl_program_load(bytes, length, &error);     file -> program, or NULL and *error
+ *     const pl_node *node = &program->nodes[0];                         the root
+ *     switch (node->kind) { case PL_NODE_SYMBOL: … program->nodes[node->as.symbol.body] …
+ *     pl_program_free(program);
+ *
+ * A program that loads keeps all that bytecode.toml promises, so nobody checks again: indices are in range, names are
+ * valid UTF-8 without NUL, constants are finite, code keeps its stack effect and ends, every cycle of nodes goes through an enter
+ * node (whose symbol is a symbol node), every path draws at most PL_LIMIT_DRAWS_PER_APPLICATION times between two
+ * symbols. A program is immutable and may be shared by threads; the caller's bytes aren't needed after loading. */
+#ifndef PL_PROGRAM_H
+#define PL_PROGRAM_H
+
+#include "affine.h"
+#include "bytecode.h"
+#include "plsys.h"
+
+typedef struct pl_string {
+    const char *text; /* NUL-terminated UTF-8 */
+    uint32_t length;  /* bytes */
+    uint64_t hash;    /* pl_name_hash */
+} pl_string;
+
+/* One node. Which member of `as` is meant follows from kind (PL_NODE_…); bytecode.h has the members:
+ *
+ *   symbol          name · live_first, live_count in program->slots · draws · body
+ *   rule            index · body
+ *   branch          test (code) · then · otherwise
+ *   choose          cases_first, cases_count in program->cases
+ *   calculate       name · code · child
+ *   transform       name · matrix in program->transforms · child
+ *   transform_code  name · code · child
+ *   texture         name · texture in program->records · code · draws · child
+ *   union_          children_first, children_count in program->children
+ *   enter           symbol (a node of kind PL_NODE_SYMBOL)
+ *   primitive       shape (PL_SHAPE_…) · code
+ *   mesh            mesh in program->meshes
+ *   object          name · ordinal · child
+ *   no_shadow       child
+ *
+ * name: index in program->strings. body, child, then, otherwise, symbol: index in program->nodes. code: as in the file, 0 for none, else
+ * offset + 1; give it to pl_run as it is. */
+typedef struct pl_node {
+    uint8_t kind;
+    uint32_t symbol; /* of a symbol node: its index in program->symbols; else 0 */
+    pl_node_fields as;
+} pl_node;
+
+/* A weighted alternative. */
+typedef struct pl_case {
+    uint32_t weight; /* code */
+    uint32_t body;   /* node */
+} pl_case;
+
+/* A constant transformation, with its inverse. */
+typedef struct pl_transform {
+    pl_affine to_parent; /* object to parent, as in the file */
+    pl_affine to_object; /* the inverse; unspecified if singular */
+    bool singular;       /* the subtree below is to be dropped and counted */
+} pl_transform;
+
+/* Settings, camera, light or texture: PL_<RECORD>_VALUES numbers, then PL_<RECORD>_ENTRY numbers an entry. What the file
+ * doesn't set has its default; in entries that is 0. */
+typedef struct pl_record {
+    uint32_t kind; /* PL_RECORD_… */
+    uint32_t entries;
+    uint32_t size; /* of values */
+    const double *values;
+} pl_record;
+
+/* A triangle mesh. */
+typedef struct pl_mesh {
+    uint32_t name; /* string */
+    uint32_t vertex_count, normal_count, triangle_count;
+    const double *vertices;           /* vertex_count * 3 */
+    const double *normals;            /* normal_count * 3, not necessarily unit; NULL if flat */
+    const uint32_t *triangles;        /* triangle_count * 3 vertex indices */
+    const uint32_t *normal_triangles; /* triangle_count * 3 normal indices; NULL if flat */
+} pl_mesh;
+
+/* Where a node stands in the source: file is a string index, lines and columns count from 1 (columns in characters).
+ * line 0: nowhere. */
+typedef struct pl_place {
+    uint32_t file, line, column, end_line, end_column;
+} pl_place;
+
+typedef struct pl_program {
+    uint32_t string_count, constant_count, parameter_count, code_length, record_count, mesh_count, node_count;
+    uint32_t symbol_count, light_count, rule_count;
+    const pl_string *strings; /* string 0 is empty */
+    const double *constants;
+    const uint32_t *parameters; /* slot -> string */
+    const uint8_t *code;
+    const pl_record *records;
+    const pl_mesh *meshes;
+    const pl_node *nodes; /* node 0 is the root */
+    const pl_place *places; /* of each node */
+    const uint32_t *symbols; /* the symbol nodes, in node order */
+    const uint32_t *rules;   /* the rule nodes, in node order */
+
+    /* Pools that the nodes' lists stand in. */
+    const uint32_t *children; /* nodes */
+    const uint32_t *slots;
+    const pl_case *cases;
+    const pl_transform *transforms;
+    uint32_t child_count, slot_count, case_count, transform_count;
+
+    /* Settings always exist (the defaults if the file has none). The first camera counts; NULL: none. */
+    const double *settings;
+    const double *camera;
+    const double *const *lights;
+
+    uint64_t seed_key; /* pl_seed_key of the settings' seed */
+    size_t bytes;      /* of memory that the program takes */
+    void *blocks;      /* the memory itself (load.c) */
+} pl_program;
+
+/* Bytecode -> program. NULL, with *error set, if the bytes aren't valid bytecode (PL_ERROR_BYTECODE), exceed a limit
+ * (PL_ERROR_LIMIT) or don't fit into memory (PL_ERROR_MEMORY). */
+pl_program *pl_program_load(const void *bytes, size_t length, pl_error *error);
+
+/* program may be NULL. */
+void pl_program_free(pl_program *program);
+
+/* "file:line:column" of a node, or "" if it has no place. Returns buffer. */
+char *pl_program_place(const pl_program *program, uint32_t node, char *buffer, size_t size);
+
+/* The node of rule `index` (rules count in source order, some may be missing), or UINT32_MAX. */
+uint32_t pl_program_rule(const pl_program *program, uint32_t index);
+
+/* pl_fail at a node's place. Always returns false. */
+bool pl_fail_at(pl_error *error, int code, const pl_program *program, uint32_t node, const char *format, ...)
+    __attribute__((format(printf, 5, 6)));
+
+/* Checks all that decoding alone doesn't (verify.c); pl_program_load calls it. */
+bool pl_program_verify(const pl_program *program, pl_error *error);
+
+#endif
