@@ -1,0 +1,349 @@
+"""The inside of a Selection: entry action, guards and rules.
+
+The grammar gives them flat, as they stand in the text; this module binds each ``else`` to the nearest ``if`` and
+puts right what it can of missing semicolons and arrows.
+
+Example: ``if (n > 0) A -> x A; else A -> x;`` is guard, rule, guard, rule, and becomes
+``If(n > 0, Rule(A, …), Rule(A, …))``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from . import syntax
+from .parse_values import MAX_DEPTH, Reading, TooDeep, call, expression, name, number, statements
+from .source import Span
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tree_sitter import Node
+
+RULE_EXAMPLE = "a rule looks like Name -> operators operand + …;"
+
+
+class _Piece(NamedTuple):
+    """One thing in a Selection's body. ``kind`` is if (value: the test), else, rule or entry (value: the node)."""
+
+    kind: str
+    span: Span
+    value: object
+
+
+def selection_body(
+    reading: Reading, nodes: list[Node], own_name: str, block: Callable[[Reading, Node, int], syntax.Block]
+) -> tuple[syntax.Term | None, list[syntax.Production]]:
+    """Entry action and productions among ``nodes``, children of a ``selection_body``. ``block`` reads a scene block inside a rule."""
+    return _Body(reading, own_name, block).read(nodes)
+
+
+class _Body:
+    def __init__(self, reading: Reading, own_name: str, block: Callable) -> None:
+        self.reading, self.own_name, self.read_block = reading, own_name, block
+
+    def read(self, nodes: list[Node]) -> tuple[syntax.Term | None, list[syntax.Production]]:
+        pieces = self.pieces(nodes)
+        entry = None
+        if pieces and pieces[0].kind == "entry":
+            entry = self.entry_action(pieces[0].value)
+            if entry is not None:
+                pieces = pieces[1:]
+        pieces = [self.rule_without_arrow(piece) if piece.kind == "entry" else piece for piece in pieces]
+        pieces = [piece for piece in pieces if piece is not None]
+        productions: list[syntax.Production] = []
+        i = 0
+        while i < len(pieces):
+            production, i = self.production(pieces, i, 0)
+            if production is not None:
+                productions.append(production)
+        return entry, productions
+
+    # --- guards
+
+    def pieces(self, nodes: list[Node], depth: int = 0) -> list[_Piece]:
+        """The body's guards, rules and entries in a flat list."""
+        if depth > MAX_DEPTH:
+            raise TooDeep(self.reading.span(nodes[0]))
+        found: list[_Piece] = []
+        for node in nodes:
+            if node.type == "guard":
+                found += self.guard(node)
+            elif node.type == "rule":
+                found += self.rules(node)
+            elif node.type == "entry":
+                found += self.entries(node)
+            elif node.type == "braced":
+                found += self.braced(node, depth)
+            elif node.type == "stray":
+                self.reading.complain(node, f"this '{self.reading.text(node)}' ends nothing", "remove it")
+        return found
+
+    def guard(self, node: Node) -> list[_Piece]:
+        word, span = node.children[0].type, self.reading.span(node)
+        if word == "else":
+            return [_Piece("else", span, None)]
+        pieces = []
+        if word in ("elseif", "elif"):
+            self.reading.complain(node.children[0], f"'{word}' is written as two words", "write else if")
+            pieces.append(_Piece("else", span, None))
+        condition = node.child_by_field_name("condition")
+        if condition is not None and condition.type != "parenthesized" and not condition.has_error:
+            text = self.reading.text(condition)
+            short = text if len(text) <= 30 and "\n" not in text else "…"
+            self.reading.complain(condition, "a condition stands in brackets", f"write if ({short})")
+        test = expression(self.reading, condition)
+        if test is None:
+            test = syntax.Number(span, 1.0, "1")
+        return [*pieces, _Piece("if", span, test)]
+
+    def braced(self, node: Node, depth: int) -> list[_Piece]:
+        opener = node.children[0]
+        self.reading.complain(opener, "braces don't surround rules",
+                              "remove them: after if (…) and else stands exactly one rule")
+        return self.pieces(node.children, depth + 1)
+
+    def production(self, pieces: list[_Piece], i: int, depth: int) -> tuple[syntax.Production | None, int]:
+        """The production that starts at ``pieces[i]``, and where the next one starts."""
+        piece = pieces[i]
+        if depth > MAX_DEPTH:
+            raise TooDeep(piece.span)
+        if piece.kind == "rule":
+            return piece.value, i + 1
+        if piece.kind == "else":
+            self.reading.complain(piece.span, "this 'else' belongs to no 'if'", "an else follows the rule of an if")
+            return None, i + 1
+        then, i = self.guarded(pieces, i + 1, piece, depth)
+        otherwise = None
+        if i < len(pieces) and pieces[i].kind == "else":
+            otherwise, i = self.guarded(pieces, i + 1, pieces[i], depth)
+        if then is None:
+            return otherwise, i
+        span = piece.span.to((otherwise or then).span)
+        return syntax.If(span, piece.value, then, otherwise), i
+
+    def guarded(
+        self, pieces: list[_Piece], i: int, guard: _Piece, depth: int
+    ) -> tuple[syntax.Production | None, int]:
+        """The production after a guard; complains when there is none."""
+        if i < len(pieces) and pieces[i].kind != "else":
+            return self.production(pieces, i, depth + 1)
+        self.reading.complain(self.reading.after(guard.span.end), f"a rule is missing after this '{guard.kind}'",
+                              RULE_EXAMPLE, "missing")
+        return None, i
+
+    # --- rules
+
+    def entries(self, node: Node) -> list[_Piece]:
+        """An entry action, or a rule without an arrow; with rules that follow it when its ';' is missing."""
+        union = self.union(node.children[0], 0)
+        late = [child for child in node.children if child.type == "late_rule"]
+        if not late:
+            self.reading.need_semicolon(node, "this line")
+        union, pieces = self.late_rules(union, late, node, "this line")
+        return [_Piece("entry", self.reading.span(node), union), *pieces] if union else pieces
+
+    def rules(self, node: Node) -> list[_Piece]:
+        target_node = node.child_by_field_name("target")
+        target = self.target(target_node)
+        late = [child for child in node.children if child.type == "late_rule"]
+        if not late:
+            self.reading.need_semicolon(node, "this rule")
+        self.arrow(node)
+        alternatives = self.alternatives(node, late)
+        span = self.reading.span(node)
+        if late:
+            span = Span(self.reading.source, node.start_byte, late[0].start_byte)
+        alternatives, pieces = self.split_late(alternatives, late, node, "this rule")
+        return [_Piece("rule", span, syntax.Rule(span, target, alternatives)), *pieces]
+
+    def target(self, node: Node) -> syntax.Name | syntax.Call:
+        return call(self.reading, node) if node.type == "call" else name(self.reading, node)
+
+    def arrow(self, node: Node) -> None:
+        arrow = node.child_by_field_name("arrow")
+        if arrow is not None and not arrow.is_missing and self.reading.text(arrow) != "->":
+            self.reading.complain(arrow, f"'{self.reading.text(arrow)}' stands where a rule has '->'", "write ->")
+
+    def split_late(
+        self, alternatives: tuple[syntax.Alternative, ...], late: list[Node], node: Node, what: str
+    ) -> tuple[tuple[syntax.Alternative, ...], list[_Piece]]:
+        if not late:
+            return alternatives, []
+        last = alternatives[-1]
+        body, pieces = self.late_rules(last.body, late, node, what)
+        return (*alternatives[:-1], replace(last, body=body)), pieces
+
+    def late_rules(
+        self, union: syntax.Union | None, late: list[Node], node: Node, what: str
+    ) -> tuple[syntax.Union | None, list[_Piece]]:
+        """``A -> x B -> y;`` lacks a ';': B, read as an operand of A's rule, is the next rule's name.
+
+        Returns ``union`` without that name, and the rules that start with it."""
+        pieces: list[_Piece] = []
+        for i, rule in enumerate(late):
+            target, union_left, end = self.take_last(union)
+            if target is None:
+                self.reading.complain(rule.children[0], "nothing stands before this arrow that a rule could be for",
+                                      RULE_EXAMPLE)
+                return union, pieces
+            if i == 0:
+                first = union_left
+                self.complain_before(rule, target, end, node, what)
+            else:
+                pieces[-1] = self.with_last_body(pieces[-1], union_left)
+                self.complain_before(rule, target, end, late[i - 1], "this rule")
+            self.arrow(rule)
+            alternatives = self.alternatives(rule, late[i + 1 :])
+            span = target.span.to(self.reading.span(rule))
+            pieces.append(_Piece("rule", span, syntax.Rule(span, target, alternatives)))
+            union = alternatives[-1].body
+        if late:
+            if node.children[-1].type != ";":
+                self.reading.missing_semicolon(node.end_byte, "this rule")
+            union = first
+        return union, pieces
+
+    def complain_before(self, rule: Node, target: syntax.Node, end: int | None, before: Node, what: str) -> None:
+        if end is None:  # nothing stands before the name but an arrow: an empty rule without ';', or two arrows
+            arrow = before.child_by_field_name("arrow")
+            end = arrow.end_byte if arrow is not None else before.start_byte
+        if end > target.span.start or (before.type == "entry" and end == before.start_byte):
+            return
+        self.reading.missing_semicolon(end, what)
+
+    @staticmethod
+    def with_last_body(piece: _Piece, body: syntax.Union | None) -> _Piece:
+        rule = piece.value
+        last = replace(rule.alternatives[-1], body=body)
+        return piece._replace(value=replace(rule, alternatives=(*rule.alternatives[:-1], last)))
+
+    @staticmethod
+    def take_last(union: syntax.Union | None) -> tuple[syntax.Name | syntax.Call | None, syntax.Union | None, int | None]:
+        """The last item of ``union`` if it can be a rule's name, the union without it, and where that ends."""
+        if union is None:
+            return None, None, None
+        *terms, term = union.terms
+        *items, item = term.items
+        if not isinstance(item, syntax.Name | syntax.Call):
+            return None, union, None
+        if items:
+            terms.append(replace(term, items=tuple(items), span=items[0].span.to(items[-1].span)))
+        if not terms:
+            return item, None, None
+        left = replace(union, terms=tuple(terms), span=terms[0].span.to(terms[-1].span))
+        return item, left, left.span.end
+
+    def alternatives(self, node: Node, late: list[Node]) -> tuple[syntax.Alternative, ...]:
+        """The alternatives of a rule; one empty one for ``A -> ;``."""
+        nodes = [child for child in node.children if child.type == "alternative"]
+        found = [self.alternative(child) for child in nodes]
+        for child in node.children:
+            if child.type == "stray":
+                self.reading.complain(child, "an alternative is missing after this '|'", "write A -> 3: x | 1: y;")
+        if not found:
+            return (syntax.Alternative(self.reading.span(node), None, None),)
+        unweighted = [each for each in found if each.weight is None]
+        if len(found) > 1 and unweighted:
+            self.reading.complain(unweighted[0].span, "this alternative has no weight", "write A -> 3: x | 1: y;")
+        return tuple(found)
+
+    def alternative(self, node: Node) -> syntax.Alternative:
+        weight_node = node.child_by_field_name("weight")
+        weight = expression(self.reading, weight_node)
+        body_node = node.child_by_field_name("body")
+        body = self.union(body_node, 0) if body_node is not None else None
+        return syntax.Alternative(self.reading.span(node), weight, body)
+
+    def union(self, node: Node, depth: int) -> syntax.Union | None:
+        if depth > MAX_DEPTH:
+            raise TooDeep(self.reading.span(node))
+        terms = []
+        for child in node.children:
+            if child.type == "term":
+                term = self.term(child, depth)
+                if term is not None:
+                    terms.append(term)
+            elif child.type == "stray":
+                self.reading.complain(child, "nothing stands after this '+'", "add an operand, or remove the '+'")
+        return syntax.Union(self.reading.span(node), tuple(terms)) if terms else None
+
+    def term(self, node: Node, depth: int) -> syntax.Term | None:
+        items = []
+        strays = [child for child in node.children if child.type == "stray"]
+        if strays:
+            self.complain_stray(strays[0])
+        for child in node.children:
+            item = self.item(child, depth)
+            if item is not None:
+                items.append(item)
+        return syntax.Term(self.reading.span(node), tuple(items)) if items else None
+
+    def complain_stray(self, node: Node) -> None:
+        text = self.reading.text(node)
+        if text[0].isdigit() or text[0] in ".<-":
+            self.reading.complain(node, f"'{text}' can't stand in a rule",
+                                  "an operation with arguments stands in square brackets: [trans 0 0 1] Tree")
+        else:
+            self.reading.complain(node, f"'{text}' can't stand in a rule", "'+' joins what a rule produces")
+
+    def item(self, node: Node, depth: int) -> syntax.Name | syntax.Call | syntax.Inline | syntax.Group | syntax.Block | None:
+        reading = self.reading
+        if node.type == "name":
+            return name(reading, node)
+        if node.type == "call":
+            return call(reading, node, depth)
+        if node.type == "block":
+            return self.read_block(reading, node, depth + 1)
+        if node.type == "inline":
+            reading.need_closer(node, "[", "]")
+            return syntax.Inline(reading.span(node), statements(reading, node.children, last_needs_semicolon=False))
+        if node.type == "group":
+            reading.need_closer(node, "(", ")")
+            unions = [child for child in node.children if child.type == "union"]
+            union = self.union(unions[0], depth + 1) if unions else None
+            if union is None and not node.has_error:
+                reading.complain(node, "these brackets hold nothing", "remove them")
+            return union and syntax.Group(reading.span(node), union)
+        return None
+
+    # --- entries
+
+    def entry_action(self, union: syntax.Union) -> syntax.Term | None:
+        """The entry action, if ``union`` looks like one: ``C_initialize Tree``."""
+        items = union.terms[0].items
+        first, last = items[0], items[-1]
+        if len(union.terms) > 1 or (isinstance(first, syntax.Name) and first.name == self.own_name):
+            return None
+        if isinstance(last, syntax.Name) and last.name == self.own_name:
+            return union.terms[0]
+        if len(items) <= 2 and all(isinstance(item, syntax.Name | syntax.Inline) for item in items):
+            written = " ".join(item.name for item in items[:1] if isinstance(item, syntax.Name)) or "[…]"
+            self.reading.complain(union.span, f"an entry action ends with its Selection's name, {self.own_name}",
+                                  f"write {written} {self.own_name};")
+            return syntax.Term(union.span, (*items[:1], syntax.Name(last.span, self.own_name)))
+        return None
+
+    def rule_without_arrow(self, piece: _Piece) -> _Piece | None:
+        """What the text means by a line that is no rule and no entry action in the first place."""
+        union = piece.value
+        items = union.terms[0].items
+        first, last = items[0], items[-1]
+        is_entry = len(union.terms) == 1 and len(items) > 1 and isinstance(last, syntax.Name) and last.name == self.own_name
+        if is_entry and not (isinstance(first, syntax.Name) and first.name == self.own_name):
+            self.reading.complain(union.span, "an entry action is the first line of its Selection",
+                                  "join several into one: C_a C_b Name;")
+            return None
+        if not isinstance(first, syntax.Name | syntax.Call):
+            self.reading.complain(union.span, "this is no rule", RULE_EXAMPLE)
+            return None
+        self.reading.complain(self.reading.after(first.span.end), "missing '->' after the rule's name",
+                              RULE_EXAMPLE, "missing")
+        rest = items[1:]
+        terms = union.terms[1:]
+        if rest:
+            terms = (syntax.Term(rest[0].span.to(last.span), rest), *terms)
+        body = syntax.Union(terms[0].span.to(terms[-1].span), terms) if terms else None
+        alternative = syntax.Alternative(body.span if body else first.span, None, body)
+        return piece._replace(kind="rule", value=syntax.Rule(piece.span, first, (alternative,)))

@@ -1,0 +1,307 @@
+"""Expressions and statements: nodes of tree-sitter's tree → nodes of :mod:`syntax`.
+
+The grammar accepts common mistakes; each is explained here, where it is read, and read on as what was probably
+meant. What can't be used at all (a gap that tree-sitter filled in) becomes None and is left out by the caller.
+
+Example::
+
+    reading = Reading(source, diagnostics)
+    expression(reading, node)       # Binary('*', Name('len'), Number(0.9))
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+from . import syntax
+from .diagnostics import Diagnostics, Note
+from .source import Source, Span
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+# Recursive readers of the tree (this one and all later stages) stay far below Python's own limit.
+MAX_DEPTH = 200
+
+_NUMBER = re.compile(r"\d+(\.\d+)?([eE][+-]?\d+)?")
+_ESCAPE = re.compile(r"\\(.)")
+_ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
+
+
+class TooDeep(Exception):
+    """Raised with the offending span; the definition it stands in is left out."""
+
+    def __init__(self, span: Span) -> None:
+        self.span = span
+
+
+class Reading:
+    """One file being read: its text, what is said about it, and the shorthands that all readers use."""
+
+    def __init__(self, source: Source, diagnostics: Diagnostics) -> None:
+        self.source, self.data, self.diagnostics = source, source.data, diagnostics
+
+    def span(self, node: Node) -> Span:
+        return Span(self.source, node.start_byte, node.end_byte)
+
+    def text(self, node: Node) -> str:
+        return self.data[node.start_byte : node.end_byte].decode(errors="replace")
+
+    def complain(self, node: Node | Span, message: str, hint: str = "", code: str = "syntax", notes: tuple[Note, ...] = ()) -> None:
+        span = node if isinstance(node, Span) else self.span(node)
+        self.diagnostics.add(code, span, message, hint, notes)
+
+    def after(self, offset: int) -> Span:
+        """The empty place at ``offset``, for what is missing there."""
+        return Span(self.source, offset, offset)
+
+    def need_semicolon(self, node: Node, what: str) -> None:
+        """Complain unless ``node`` ends with ';'."""
+        if node.children[-1].type != ";":
+            self.missing_semicolon(node.end_byte, what)
+
+    def missing_semicolon(self, offset: int, what: str) -> None:
+        self.complain(self.after(offset), f"missing ';' after {what}", "add ';' here", "missing")
+
+    def need_closer(self, node: Node, opener: str, closer: str) -> bool:
+        """Complain unless ``node`` ends with ``closer``; the message points at the opener."""
+        if node.children[-1].type == closer and not node.children[-1].is_missing:
+            return True
+        self.never_closed(node.start_byte, opener, closer)
+        return False
+
+    def never_closed(self, offset: int, opener: str, closer: str) -> None:
+        span = Span(self.source, offset, offset + len(opener))
+        self.complain(span, f"this '{opener}' is never closed", f"add the '{closer}' that belongs to it", "unclosed")
+
+
+# --- expressions
+
+
+def expression(reading: Reading, node: Node | None, depth: int = 0) -> syntax.Expression | None:
+    """The expression at ``node``, or None where the text has none. Raises TooDeep."""
+    if node is None:
+        return None
+    read = _EXPRESSIONS.get(node.type)
+    if read is None:
+        return None
+    if depth > MAX_DEPTH:
+        raise TooDeep(reading.span(node))
+    return read(reading, node, depth)
+
+
+def expressions(reading: Reading, nodes: list[Node], depth: int) -> tuple[syntax.Expression, ...]:
+    """All of ``nodes`` that are expressions."""
+    found = (expression(reading, node, depth + 1) for node in nodes)
+    return tuple(value for value in found if value is not None)
+
+
+def name(reading: Reading, node: Node | None) -> syntax.Name:
+    """The name at ``node``; an empty one where it is missing (which has been reported)."""
+    if node is None:
+        return syntax.Name(reading.after(0), "")
+    return syntax.Name(reading.span(node), reading.text(node))
+
+
+def _name(reading: Reading, node: Node, depth: int) -> syntax.Name | None:
+    return None if node.is_missing else name(reading, node)
+
+
+def number(reading: Reading, node: Node, depth: int = 0) -> syntax.Number | None:
+    if node.is_missing:
+        return None
+    text = reading.text(node)
+    if not _NUMBER.fullmatch(text):
+        return _malformed_number(reading, node, text)
+    value = float(text)
+    if math.isinf(value):
+        reading.complain(node, f"the number {text} is too large", "the largest is 1.7976931348623157e308")
+        value = 0.0
+    return syntax.Number(reading.span(node), value, text)
+
+
+def _malformed_number(reading: Reading, node: Node, text: str) -> syntax.Number:
+    """Explain ``.5``, ``5.``, ``2x`` or ``1.5.2``, and read on with the number at its start."""
+    if re.fullmatch(r"\.\d+([eE]\d+)?", text):
+        reading.complain(node, f"'{text}' lacks a digit before the point", f"write 0{text}")
+        text = "0" + text
+    elif match := re.fullmatch(r"(\d+)\.([eE]\d+)?", text):
+        fixed = f"{match[1]}.0{match[2] or ''}"
+        reading.complain(node, f"'{text}' lacks a digit after the point", f"write {fixed}")
+        text = fixed
+    elif match := re.fullmatch(r"(\d+(?:\.\d+)?)([A-Za-z_]\w*)", text):
+        reading.complain(node, f"the number {match[1]} touches the name {match[2]}",
+                         f"write {match[1]}*{match[2]} for the product, or a space between two values")
+    else:
+        reading.complain(node, f"'{text}' is no number", "a number looks like 2, 0.5 or 1.5e-3")
+    start = _NUMBER.match(text)
+    return syntax.Number(reading.span(node), float(start[0]) if start else 0.0, text)
+
+
+def string(reading: Reading, node: Node | None, depth: int = 0) -> syntax.String | None:
+    """The text between the quotes. Escapes are ``\\"``, ``\\\\``, ``\\n`` and ``\\t``; another backslash is itself."""
+    if node is None or node.is_missing:
+        return None
+    text = reading.text(node)
+    if not re.fullmatch(r'"([^"\\]|\\.)*"', text):
+        reading.complain(node, "this string is never closed", "add '\"' at its end, on the same line", "unclosed")
+        text += '"'
+    value = _ESCAPE.sub(lambda match: _ESCAPES.get(match[1], match[0]), text[1:-1])
+    return syntax.String(reading.span(node), value)
+
+
+def call(reading: Reading, node: Node, depth: int = 0) -> syntax.Call:
+    callee = node.child_by_field_name("name")
+    bracket = node.children[1]
+    if bracket.start_byte > callee.end_byte:
+        text = reading.text(callee)
+        reading.complain(Span(reading.source, callee.start_byte, bracket.end_byte),
+                         "a space stands between a function and its bracket", f"write {text}(…)")
+    need_parenthesis(reading, node, bracket)
+    arguments = expressions(reading, node.children_by_field_name("argument"), depth)
+    return syntax.Call(reading.span(node), name(reading, callee), arguments)
+
+
+def need_parenthesis(reading: Reading, node: Node, opener: Node) -> None:
+    """Complain unless ``node`` ends with ')'; tree-sitter may have put in a missing one itself."""
+    last = node.children[-1]
+    if last.type != ")" or last.is_missing:
+        reading.never_closed(opener.start_byte, "(", ")")
+
+
+def _vector(reading: Reading, node: Node, depth: int) -> syntax.Vector:
+    last = node.children[-1]
+    if last.type != ">" or last.is_missing:
+        reading.never_closed(node.start_byte, "<", ">")
+    components = expressions(reading, node.named_children, depth)
+    if not 2 <= len(components) <= 5 and not node.has_error:
+        reading.complain(node, f"a vector has 2 to 5 components, this one has {len(components)}", "write <x, y, z>")
+    return syntax.Vector(reading.span(node), components)
+
+
+def _parenthesized(reading: Reading, node: Node, depth: int) -> syntax.Expression | None:
+    need_parenthesis(reading, node, node.children[0])
+    inside = node.named_children
+    return expression(reading, inside[0], depth + 1) if inside else None
+
+
+def _unary(reading: Reading, node: Node, depth: int) -> syntax.Unary | None:
+    operand = expression(reading, node.child_by_field_name("operand"), depth + 1)
+    operator = reading.text(node.children[0]).strip()
+    return operand and syntax.Unary(reading.span(node), operator, operand)
+
+
+def _binary(reading: Reading, node: Node, depth: int) -> syntax.Expression | None:
+    """Long sums lean left, so the left spine is walked in a loop."""
+    spine = []
+    while node.type == "binary":
+        spine.append(node)
+        node = node.children[0]
+    if depth + len(spine) > MAX_DEPTH:
+        raise TooDeep(reading.span(spine[0]))
+    left = expression(reading, node, depth + len(spine))
+    for node in reversed(spine):
+        sign = node.children[1]
+        operator = reading.text(sign).strip()
+        if operator == "=":
+            reading.complain(sign, "'=' assigns a value and can't stand inside an expression", "'==' compares",
+                             "assignment-in-condition")
+            operator = "=="
+        right = expression(reading, node.children[-1], depth + 1)
+        if left is None or right is None:
+            return left or right
+        left = syntax.Binary(reading.span(node), operator, left, right)
+    return left
+
+
+def _conditional(reading: Reading, node: Node, depth: int) -> syntax.Conditional | None:
+    parts = [expression(reading, node.child_by_field_name(field), depth + 1) for field in ("test", "then", "otherwise")]
+    return None if None in parts else syntax.Conditional(reading.span(node), *parts)
+
+
+_EXPRESSIONS = {
+    "number": number,
+    "string": string,
+    "name": _name,
+    "call": call,
+    "vector": _vector,
+    "unary": _unary,
+    "binary": _binary,
+    "conditional": _conditional,
+    "parenthesized": _parenthesized,
+}
+
+
+# --- statements
+
+
+def statements(reading: Reading, nodes: list[Node], last_needs_semicolon: bool = True) -> tuple[syntax.Statement, ...]:
+    """The statements among ``nodes``, children of a body or of an inline operator."""
+    found: list[syntax.Statement] = []
+    usable = [node for node in nodes if node.type in _STATEMENTS]
+    for node in usable:
+        if node is not usable[-1] or last_needs_semicolon:
+            reading.need_semicolon(node, "this statement")
+        found += _STATEMENTS[node.type](reading, node)
+    return tuple(found)
+
+
+def _assignment(reading: Reading, node: Node) -> list[syntax.Statement]:
+    target, operator = node.child_by_field_name("target"), node.child_by_field_name("operator")
+    value = expression(reading, node.child_by_field_name("value"))
+    if value is None:
+        return []
+    return [syntax.Assignment(reading.span(node), name(reading, target), reading.text(operator), value)]
+
+
+def _step(reading: Reading, node: Node) -> list[syntax.Statement]:
+    target, operator = node.child_by_field_name("target"), node.child_by_field_name("operator")
+    return [syntax.Assignment(reading.span(node), name(reading, target), reading.text(operator), None)]
+
+
+def _operation(reading: Reading, node: Node) -> list[syntax.Statement]:
+    called = node.child_by_field_name("call")
+    if called is not None:
+        operation = call(reading, called)
+        reading.complain(called, "an operation's arguments stand without brackets",
+                         f"write {operation.name.name} and its arguments, side by side or with commas")
+        return [syntax.Operation(reading.span(node), operation.name, operation.arguments)]
+    parts = [child for child in node.children if child.type != ";"]
+    found: list[syntax.Statement] = []
+    for start, end in _split_lines(reading, parts):
+        found.append(_one_operation(reading, parts[start:end]))
+        if end < len(parts):
+            reading.missing_semicolon(parts[end - 1].end_byte, "this statement")
+    return found
+
+
+def _split_lines(reading: Reading, parts: list[Node]) -> list[tuple[int, int]]:
+    """Where a ';' is missing at a line's end, the next line's operation reads as more arguments. A name that
+    begins a line no deeper than the operation does starts a new one."""
+    starts = [0]
+    column = parts[0].start_point[1]
+    for i in range(1, len(parts)):
+        begins_line = parts[i].start_point[0] > parts[i - 1].end_point[0]
+        if begins_line and parts[i].type == "name" and parts[i].start_point[1] <= column:
+            starts.append(i)
+    return list(zip(starts, [*starts[1:], len(parts)]))
+
+
+def _one_operation(reading: Reading, parts: list[Node]) -> syntax.Operation:
+    commas = [part for part in parts if part.type == ","]
+    arguments = expressions(reading, [part for part in parts[1:] if part.type != ","], 0)
+    # With commas, arguments and commas take turns.
+    if commas and [part.type == "," for part in parts[1:]] != [i % 2 == 1 for i in range(2 * len(arguments) - 1)]:
+        text = reading.text(parts[0])
+        if len(commas) < len(arguments) - 1:
+            reading.complain(commas[0], "commas stand between some of these arguments only",
+                             f"write {text} with a comma between all arguments, or with none")
+        else:
+            reading.complain(commas[-1], "this ',' separates nothing", "remove it")
+    span = Span(reading.source, parts[0].start_byte, parts[-1].end_byte)
+    return syntax.Operation(span, name(reading, parts[0]), arguments)
+
+
+_STATEMENTS = {"assignment": _assignment, "step": _step, "operation": _operation}
