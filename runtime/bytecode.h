@@ -19,6 +19,7 @@ enum {
     PL_LIMIT_HASH_ARGUMENTS = 16,
     PL_LIMIT_BYTES = 1073741824,
     PL_LIMIT_NODES = 16777216,
+    PL_LIMIT_RECORD_NUMBERS = 16777216,
 };
 
 /* Constants of the random functions (random.h). */
@@ -72,23 +73,23 @@ enum pl_node_id {
     PL_NODE_NO_SHADOW = 14,
 };
 
-/* Node kinds: X(ENUM, name, id, letter in pictures). */
+/* Node kinds: X(ENUM, name, id, letter in pictures, first field in PL_NODE_FIELDS, fields). */
 #define PL_NODES(X) \
-    X(EMPTY, "empty", 0, "") \
-    X(SYMBOL, "symbol", 1, "S") \
-    X(RULE, "rule", 2, "") \
-    X(BRANCH, "branch", 3, "") \
-    X(CHOOSE, "choose", 4, "") \
-    X(CALCULATE, "calculate", 5, "C") \
-    X(TRANSFORM, "transform", 6, "T") \
-    X(TRANSFORM_CODE, "transform_code", 7, "T") \
-    X(TEXTURE, "texture", 8, "X") \
-    X(UNION, "union", 9, "+") \
-    X(ENTER, "enter", 10, "") \
-    X(PRIMITIVE, "primitive", 11, "P") \
-    X(MESH, "mesh", 12, "P") \
-    X(OBJECT, "object", 13, "") \
-    X(NO_SHADOW, "no_shadow", 14, "")
+    X(EMPTY, "empty", 0, "", 0, 0) \
+    X(SYMBOL, "symbol", 1, "S", 0, 4) \
+    X(RULE, "rule", 2, "", 4, 2) \
+    X(BRANCH, "branch", 3, "", 6, 3) \
+    X(CHOOSE, "choose", 4, "", 9, 1) \
+    X(CALCULATE, "calculate", 5, "C", 10, 3) \
+    X(TRANSFORM, "transform", 6, "T", 13, 3) \
+    X(TRANSFORM_CODE, "transform_code", 7, "T", 16, 3) \
+    X(TEXTURE, "texture", 8, "X", 19, 5) \
+    X(UNION, "union", 9, "+", 24, 1) \
+    X(ENTER, "enter", 10, "", 25, 1) \
+    X(PRIMITIVE, "primitive", 11, "P", 26, 2) \
+    X(MESH, "mesh", 12, "P", 28, 1) \
+    X(OBJECT, "object", 13, "", 29, 3) \
+    X(NO_SHADOW, "no_shadow", 14, "", 32, 1)
 
 /* Types of node fields. */
 enum pl_field_id {
@@ -490,5 +491,14 @@ enum {
     X(TEXTURE, "specular", 26, 1) \
     X(TEXTURE, "roughness", 27, 1) \
     X(TEXTURE, "reflection", 28, 3)
+
+/* Numbers of an entry: X(RECORD, name, offset in the entry). */
+#define PL_RECORD_ENTRIES(X) \
+    X(TEXTURE, "position", 0) \
+    X(TEXTURE, "red", 1) \
+    X(TEXTURE, "green", 2) \
+    X(TEXTURE, "blue", 3) \
+    X(TEXTURE, "filter", 4) \
+    X(TEXTURE, "transmit", 5)
 
 #endif

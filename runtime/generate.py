@@ -97,6 +97,7 @@ def c_nodes(table: dict) -> list[str]:
         if words := words_of(node):
             member = node["name"] + ("_" if node["name"] in C_KEYWORDS else "")
             structs.append(f"    struct {{ uint32_t {', '.join(words)}; }} {member};")
+    firsts = {node["name"]: sum(len(fields_of(n)) for n in nodes[:i]) for i, node in enumerate(nodes)}
     field_rows = [
         f'{node["name"].upper()}, "{name}", PL_FIELD_{kind.upper()}'
         for node in nodes
@@ -106,8 +107,12 @@ def c_nodes(table: dict) -> list[str]:
         *c_enum("NODE", nodes, "Node kinds."),
         *c_table(
             "PL_NODES",
-            "Node kinds: X(ENUM, name, id, letter in pictures).",
-            [f'{row["name"].upper()}, "{row["name"]}", {row["id"]}, "{row["letter"]}"' for row in nodes],
+            "Node kinds: X(ENUM, name, id, letter in pictures, first field in PL_NODE_FIELDS, fields).",
+            [
+                f'{row["name"].upper()}, "{row["name"]}", {row["id"]}, "{row["letter"]}", '
+                f"{firsts[row['name']]}, {len(fields_of(row))}"
+                for row in nodes
+            ],
         ),
         "/* Types of node fields. */",
         "enum pl_field_id {",
@@ -168,7 +173,13 @@ def c_records(table: dict) -> list[str]:
         for record in table["record"]
         for name, offset, size, _ in values_of(record)
     ]
-    return lines + c_table("PL_RECORD_FIELDS", "Values of records: X(RECORD, name, offset, size).", rows)
+    lines += c_table("PL_RECORD_FIELDS", "Values of records: X(RECORD, name, offset, size).", rows)
+    rows = [
+        f'{record["name"].upper()}, "{name}", {i}'
+        for record in table["record"]
+        for i, name in enumerate(record.get("entry", []))
+    ]
+    return lines + c_table("PL_RECORD_ENTRIES", "Numbers of an entry: X(RECORD, name, offset in the entry).", rows)
 
 
 def c_shapes(table: dict) -> list[str]:

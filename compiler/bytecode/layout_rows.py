@@ -242,4 +242,5 @@ LIMITS = {
     "hash_arguments": 16,
     "bytes": 1073741824,
     "nodes": 16777216,
+    "record_numbers": 16777216,
 }
