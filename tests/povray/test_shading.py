@@ -270,3 +270,48 @@ def test_uniform_antialiasing(threshold, count, gamma):
     options = f"+A{threshold}", "+AM1", f"+R{count}", "-J", f"Antialias_Gamma={gamma}"
     ours = uniform(scene, WIDTH, HEIGHT, count, threshold, gamma)
     assert largest_difference(ours, povray(scene, WIDTH, HEIGHT, *options)) <= 1e-5
+
+
+SAME = {
+    "reflection of a number": ("reflection rgb <0.2, 0.3, 0.4>", "reflection { rgb <0.2, 0.3, 0.4> }"),
+    "cone of a spotlight": ("radius 30.0 falloff 45.0 tightness 0.0", ""),
+    "trace limits": ("max_trace_level 5 adc_bailout 0.00392156862745098", ""),
+    "moved light": (
+        "<3.0, -2.0, 4.0>, rgb <0.5, 0.5, 0.4>",
+        "<2, 0, 3>, rgb <0.5, 0.5, 0.4> translate <1, -2, 1>",
+    ),
+    "background behind itself": ("rgb <0.2, 0.3, 0.5>", "rgbft <0.4, 0.6, 1, 0.3, 0.5>"),
+}
+
+
+@pytest.mark.parametrize("what", SAME)
+def test_two_spellings_of_the_same(what):
+    light = spot()
+    if what == "moved light":
+        light = Light(light.location, light.colour, fade_distance=4.0, fade_power=2.0)
+    body = Object(Torus(1.0, 0.35), GLASS, MIRROR, modifiers=[("translate", (0, 0, 1))])
+    scene = Scene([TILES, body], [light], background=SKY)
+    text, (long, short) = scene.pov(), SAME[what]
+    assert long in text
+    theirs = povray(text.replace(long, short, 1), WIDTH, HEIGHT)
+    assert largest_difference(scene.render(WIDTH, HEIGHT), theirs) <= 1e-5
+
+
+def test_texture_follows_only_the_modifiers_after_it():
+    moved = [("rotate", (0, 0, 30)), ("translate", (-0.5, 0, 0.2))]
+    shifted = Checker(modifiers=[("scale", (0.3, 0.3, 0.3)), ("translate", (-0.5, 0, 0.2))])
+    scene = world(Object(Box((0, 0, 0), (1, 1, 1)), shifted, modifiers=moved, texture_last=True))
+    text = world().pov() + (
+        "box { <0, 0, 0>, <1, 1, 1> rotate <0, 0, 30> "
+        "pigment { checker rgb <0, 0, 1>, rgb <0, 1, 0> scale 0.3 } translate <-0.5, 0, 0.2> }"
+    )
+    assert largest_difference(scene.render(WIDTH, HEIGHT), povray(text, WIDTH, HEIGHT)) <= 1e-5
+
+
+def test_smooth_triangle_beyond_a_right_angle_is_dropped_but_a_mesh_keeps_it():
+    corners = [(-1, 0, 0.2), (1, 0.2, 0.3), (0.1, 0.3, 2)]
+    triangle = Triangle(corners, [(1, 0, -0.2), (-1, 0, 0.1), (0, 0.3, 1)])
+    alone = povray(world(Object(triangle, GLASS, GLOSS)), WIDTH, HEIGHT)
+    assert largest_difference(world().render(WIDTH, HEIGHT), alone) <= 1e-5
+    meshed = world(Object(Mesh([triangle]), GLASS, GLOSS))
+    assert largest_difference(meshed.render(WIDTH, HEIGHT), povray(meshed, WIDTH, HEIGHT)) <= 1e-5
