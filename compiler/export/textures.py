@@ -27,10 +27,12 @@ PATTERN_NAMES = {number: name for name, number in PATTERNS.items()}
 
 @dataclass(frozen=True)
 class Texture:
-    """One texture: ``row`` as above, ``frame`` the (3, 4) map of the place where it stands to the world."""
+    """One texture: ``row`` as above, ``frame`` the (3, 4) map of the place where it stands to the world, ``name`` that
+    of its first operator, or ''."""
 
     row: np.ndarray
     frame: np.ndarray
+    name: str = ""
 
     def value(self, name: str) -> np.ndarray:
         field = RECORD.values[name]
@@ -91,6 +93,7 @@ class Palette:
     texture, however many operators and places it comes from."""
 
     def __init__(self, graph) -> None:
+        self._nodes = graph.nodes
         self._rows: dict[int, np.ndarray] = {}  # texture node -> row of a constant texture
         self._same: dict[int, int] = {-1: -1}  # texture node -> first node of equal values
         first: dict[bytes, int] = {}
@@ -125,7 +128,5 @@ class Palette:
         node = int(batch.texture[i])
         if node < 0:
             return None
-        if batch.values.shape[1]:
-            row = batch.values[i]
-            return Texture(row[~np.isnan(row)], frame)
-        return Texture(self._rows[node], frame)
+        row = batch.values[i] if batch.values.shape[1] else self._rows[node]
+        return Texture(row[~np.isnan(row)], frame, self._nodes[node].name)
