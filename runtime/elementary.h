@@ -33,7 +33,7 @@ double pl_min(double a, double b); /* a < b ? a : b, so NaN and -0 have one mean
 double pl_max(double a, double b);
 
 /* A pure opcode (PL_OP_ADD … PL_OP_ATAN2, PL_OP_BOOL) applied to as many of a, b, c as it pops; NaN for any other. */
-double pl_elementary(int opcode, double a, double b, double c);
+PL_API double pl_elementary(int opcode, double a, double b, double c);
 
 /* out[i] = opcode(a[i], b[i], c[i]); arrays that the opcode doesn't need may be NULL. false: not a pure opcode. */
 PL_API bool pl_elementary_array(int opcode, size_t n, const double *a, const double *b, const double *c, double *out);

@@ -1,0 +1,563 @@
+/* elementary.c - see elementary.h.
+ *
+ * Method: arguments are reduced exactly, the function is evaluated as an unevaluated sum of two doubles ("double-double":
+ * Dekker 1971) with a relative error below 2^-62, and rounded once. Of each Taylor series only the leading terms need
+ * double-double; the rest, small enough, is a Horner scheme in double. Sources: Muller et al., Handbook of
+ * Floating-Point Arithmetic, chapters 4, 5 and 11. */
+#include "elementary.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "bytecode.h"
+#include "random.h"
+
+#if defined __FAST_MATH__ || !defined __FLT_EVAL_METHOD__ || __FLT_EVAL_METHOD__ != 0
+#error "results must have the same bits everywhere: compile without -ffast-math, for a machine with IEEE double arithmetic"
+#endif
+
+/* --- double-double --- */
+
+typedef struct pair {
+    double high, low; /* |low| <= ulp(high) / 2 */
+} pair;
+
+/* a + b exactly, for |a| >= |b| or a = 0. */
+static inline pair fast_two_sum(double a, double b) {
+    const double sum = a + b;
+    return (pair){sum, b - (sum - a)};
+}
+
+/* a + b exactly. */
+static inline pair two_sum(double a, double b) {
+    const double sum = a + b, b_seen = sum - a;
+    return (pair){sum, (a - (sum - b_seen)) + (b - b_seen)};
+}
+
+/* The upper 26 bits; for |a| < 2^996. */
+static inline double upper(double a) {
+    const double t = 0x1.0000002p27 * a;
+    return t - (t - a);
+}
+
+/* a * b exactly, where nothing over- or underflows. */
+static inline pair two_product(double a, double b) {
+    const double product = a * b, a1 = upper(a), b1 = upper(b), a2 = a - a1, b2 = b - b1;
+    return (pair){product, ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2};
+}
+
+static inline pair add(pair a, pair b) {
+    pair high = two_sum(a.high, b.high);
+    const pair low = two_sum(a.low, b.low);
+    high = fast_two_sum(high.high, high.low + low.high);
+    return fast_two_sum(high.high, high.low + low.low);
+}
+
+static inline pair multiply(pair a, pair b) {
+    const pair p = two_product(a.high, b.high);
+    return fast_two_sum(p.high, p.low + (a.high * b.low + a.low * b.high));
+}
+
+static inline pair scale_by(pair a, double b) {
+    return multiply(a, (pair){b, 0});
+}
+
+static inline pair divide(pair a, pair b) {
+    const double q1 = a.high / b.high;
+    const pair p = scale_by(b, q1);
+    const pair rest = add(a, (pair){-p.high, -p.low});
+    return fast_two_sum(q1, rest.high / b.high);
+}
+
+/* Newton's step from the double root. */
+static inline pair root(pair a) {
+    if (a.high <= 0)
+        return (pair){0, 0};
+    const double r = sqrt(a.high);
+    const pair square = two_product(r, r);
+    const pair rest = add(a, (pair){-square.high, -square.low});
+    return fast_two_sum(r, rest.high / (2 * r));
+}
+
+static inline pair negate(pair a) {
+    return (pair){-a.high, -a.low};
+}
+
+/* --- exponents --- */
+
+static inline uint64_t bits_of(double a) {
+    uint64_t bits;
+    memcpy(&bits, &a, sizeof bits);
+    return bits;
+}
+
+static inline double from_bits(uint64_t bits) {
+    double a;
+    memcpy(&a, &bits, sizeof a);
+    return a;
+}
+
+/* 2^exponent for -1022 <= exponent <= 1023. */
+static inline double power_of_two(int exponent) {
+    return from_bits((uint64_t)(exponent + 1023) << 52);
+}
+
+/* a = result * 2^*exponent with 1 <= |result| < 2, for finite a != 0. */
+static double split(double a, int *exponent) {
+    int e = 0;
+    if (fabs(a) < 0x1p-1022) {
+        a *= 0x1p54;
+        e = -54;
+    }
+    const uint64_t bits = bits_of(a);
+    *exponent = e + (int)((bits >> 52) & 0x7FF) - 1023;
+    return from_bits((bits & UINT64_C(0x800FFFFFFFFFFFFF)) | UINT64_C(0x3FF0000000000000));
+}
+
+/* a * 2^exponent, rounded once, also to a denormal number, 0 or infinity. 2^-60 < |a.high| < 2^60. */
+static double join(pair a, int exponent) {
+    if (exponent > 2000)
+        exponent = 2000;
+    if (exponent < -2000)
+        exponent = -2000;
+    int e;
+    split(a.high, &e);
+    if (e + exponent >= -1021) {
+        double result = a.high + a.low;
+        for (; exponent > 1023; exponent -= 1000)
+            result *= 0x1p1000;
+        for (; exponent < -900; exponent += 900)
+            result *= 0x1p-900;
+        return result * power_of_two(exponent);
+    }
+    if (e + exponent < -1080)
+        return a.high < 0 ? -0.0 : 0.0;
+    /* Adding a number whose ulp is the denormals' spacing, 2^(-1074 - exponent), rounds there. */
+    const double anchor = copysign(1, a.high) * power_of_two(-1022 - exponent);
+    const pair sum = two_sum(anchor, a.high);
+    const double rounded = (sum.high + (sum.low + a.low)) - anchor;
+    const int half = exponent / 2;
+    return rounded * power_of_two(half) * power_of_two(exponent - half);
+}
+
+/* --- circular functions --- */
+
+static const pair RADIANS = {0x1.1df46a2529d39p-6, 0x1.5c1d8becdd291p-62};   /* pi / 180 */
+static const pair DEGREES = {0x1.ca5dc1a63c1f8p+5, -0x1.1e7ab456405f9p-49};  /* 180 / pi */
+static const pair THIRD = {0x1.5555555555555p-2, 0x1.5555555555555p-56};
+
+/* a * constant, rounded once, for every finite a != 0. */
+static double scaled(double a, pair constant) {
+    int exponent;
+    const double mantissa = split(a, &exponent);
+    return join(scale_by(constant, mantissa), exponent);
+}
+
+/* Sine of x radians, |x| <= pi/4: x (1 - x^2/6 + x^4/120 - ...). */
+static pair sine(pair x) {
+    static const pair c1 = {-0x1.5555555555555p-3, -0x1.5555555555555p-57}, c2 = {0x1.1111111111111p-7, 0x1.1111111111111p-63};
+    const pair x2 = multiply(x, x);
+    const double z = x2.high;
+    const double tail =
+        -1.0 / 5040 +
+        z * (1.0 / 362880 +
+             z * (-1.0 / 39916800 +
+                  z * (1.0 / 6227020800 +
+                       z * (-1.0 / 1307674368000 + z * (1.0 / 355687428096000 + z * (-1.0 / 121645100408832000))))));
+    pair sum = add(c2, two_product(z, tail));
+    sum = add(c1, multiply(x2, sum));
+    return add(x, multiply(x, multiply(x2, sum)));
+}
+
+/* Cosine of x radians, |x| <= pi/4: 1 - x^2/2 + x^4/24 - ... */
+static pair cosine(pair x) {
+    static const pair c2 = {0x1.5555555555555p-5, 0x1.5555555555555p-59}, c3 = {-0x1.6c16c16c16c17p-10, 0x1.f49f49f49f49fp-65};
+    const pair x2 = multiply(x, x);
+    const double z = x2.high;
+    const double tail =
+        1.0 / 40320 +
+        z * (-1.0 / 3628800 +
+             z * (1.0 / 479001600 +
+                  z * (-1.0 / 87178291200 +
+                       z * (1.0 / 20922789888000 + z * (-1.0 / 6402373705728000 + z * (1.0 / 2432902008176640000))))));
+    pair sum = add(c3, two_product(z, tail));
+    sum = add(c2, multiply(x2, sum));
+    sum = add((pair){-0.5, 0}, multiply(x2, sum));
+    return add((pair){1, 0}, multiply(x2, sum));
+}
+
+/* degrees = 360 n + 90 * quadrant + rest exactly, |rest| <= 45. Every step is exact (fmod; Sterbenz for the difference). */
+static double reduce(double degrees, int *quadrant) {
+    const double turn = fmod(degrees, 360);
+    const double q = pl_round(turn / 90);
+    *quadrant = (int)q & 3;
+    return turn - 90 * q;
+}
+
+/* Below this an angle's sine and tangent are the angle, its cosine is 1, as far as a double can tell. */
+static const double TINY = 0x1p-40;
+
+double pl_sin(double degrees) {
+    if (!(degrees - degrees == 0) || degrees == 0)
+        return degrees == 0 ? degrees : NAN;
+    int quadrant;
+    const double rest = reduce(degrees, &quadrant);
+    pair result;
+    if (quadrant % 2 == 0 && fabs(rest) < TINY) {
+        const double small = rest == 0 ? 0 : scaled(rest, RADIANS);
+        return rest == 0 ? copysign(0, degrees) : quadrant == 2 ? -small : small;
+    }
+    const pair x = scale_by(RADIANS, rest);
+    result = quadrant % 2 ? cosine(x) : sine(x);
+    return quadrant >= 2 ? -result.high - result.low : result.high + result.low;
+}
+
+double pl_cos(double degrees) {
+    if (!(degrees - degrees == 0))
+        return NAN;
+    int quadrant;
+    const double rest = reduce(degrees, &quadrant);
+    if (quadrant % 2 && rest == 0)
+        return 0;
+    if (quadrant % 2 == 0 && fabs(rest) < TINY)
+        return quadrant == 2 ? -1 : 1;
+    const pair x = scale_by(RADIANS, rest);
+    const pair result = quadrant % 2 ? sine(x) : cosine(x);
+    return quadrant == 1 || quadrant == 2 ? -result.high - result.low : result.high + result.low;
+}
+
+double pl_tan(double degrees) {
+    if (!(degrees - degrees == 0) || degrees == 0)
+        return degrees == 0 ? degrees : NAN;
+    int quadrant;
+    const double rest = reduce(degrees, &quadrant);
+    if (rest == 0)
+        return quadrant % 2 ? copysign(INFINITY, pl_sin(degrees)) : copysign(0, degrees);
+    if (quadrant % 2 == 0 && fabs(rest) < TINY)
+        return scaled(rest, RADIANS);
+    const pair x = scale_by(RADIANS, rest), s = sine(x), c = cosine(x);
+    const pair result = quadrant % 2 ? divide(negate(c), s) : divide(s, c);
+    return result.high + result.low;
+}
+
+/* Arc tangent of n / d in degrees, for 0 <= n <= d, d > 0, nothing near over- or underflow. With c = j/16 near n/d:
+ * atan(n/d) = atan(c) + atan((n - c d) / (d + c n)), whose argument is at most 1/32. */
+static pair arc_tangent(pair n, pair d) {
+    static const pair table[17] = {
+        {0x0.0p+0, 0x0.0p+0},
+        {0x1.c9c55326164cfp+1, -0x1.88708ff33aabap-55},
+        {0x1.c80044927fe83p+2, -0x1.2a9346eb4b87bp-53},
+        {0x1.53d4374d3c2a3p+3, 0x1.c5b7fa992d71fp-52},
+        {0x1.c128e80fae02ep+3, -0x1.0fc10e257c651p-53},
+        {0x1.15aa15bcab87ep+4, 0x1.2f23fe5f78d35p-52},
+        {0x1.48e58fac13547p+4, 0x1.bdef92fae944fp-51},
+        {0x1.7a11ee6220071p+4, -0x1.63c539bb8dcc2p-55},
+        {0x1.a90a731a61dc4p+4, -0x1.80b27b26e182bp-51},
+        {0x1.d5b95bc765110p+4, 0x1.6f006acd20fc1p-52},
+        {0x1.000b0659f5545p+5, 0x1.0e62435c62f2fp-49},
+        {0x1.141174800a666p+5, 0x1.e004defca5108p-50},
+        {0x1.26f58ce59e23cp+5, 0x1.80b27b26e182bp-50},
+        {0x1.38c03916765b8p+5, 0x1.50a2d34ee7050p-49},
+        {0x1.497cc65551cf8p+5, -0x1.2dd089737cc28p-49},
+        {0x1.5938181bde651p+5, 0x1.ea28ab192aaf3p-51},
+        {0x1.6800000000000p+5, 0x0.0p+0},
+    };
+    const int j = (int)(n.high / d.high * 16 + 0.5);
+    const double c = j / 16.0;
+    const pair u = divide(add(n, scale_by(d, -c)), add(d, scale_by(n, c)));
+    const pair u2 = multiply(u, u);
+    const double z = u2.high;
+    const double tail = 1.0 / 5 + z * (-1.0 / 7 + z * (1.0 / 9 + z * (-1.0 / 11 + z * (1.0 / 13 - z / 15))));
+    const pair sum = add(negate(THIRD), two_product(z, tail));
+    const pair angle = add(u, multiply(u, multiply(u2, sum)));
+    return add(table[j], multiply(angle, DEGREES));
+}
+
+/* atan2 in degrees of n (its sign apart) and d, neither 0. */
+static pair angle_of(pair n, pair d) {
+    const bool left = d.high < 0;
+    if (left)
+        d = negate(d);
+    pair angle;
+    if (n.high <= d.high)
+        angle = arc_tangent(n, d);
+    else
+        angle = add((pair){90, 0}, negate(arc_tangent(d, n)));
+    return left ? add((pair){180, 0}, negate(angle)) : angle;
+}
+
+double pl_atan2(double y, double x) {
+    if (x != x || y != y)
+        return NAN;
+    const bool left = signbit(x);
+    if (y == 0)
+        return copysign(left ? 180 : 0, y);
+    if (x == 0)
+        return copysign(90, y);
+    const bool x_infinite = x - x != 0, y_infinite = y - y != 0;
+    if (x_infinite && y_infinite)
+        return copysign(left ? 135 : 45, y);
+    if (x_infinite)
+        return copysign(left ? 180 : 0, y);
+    if (y_infinite)
+        return copysign(90, y);
+    int x_exponent, y_exponent;
+    const double x_mantissa = split(x, &x_exponent), y_mantissa = fabs(split(y, &y_exponent));
+    const int difference = y_exponent - x_exponent;
+    if (difference > 60)
+        return copysign(90, y);
+    if (difference < -60) {
+        if (left)
+            return copysign(180, y);
+        const pair quotient = divide((pair){y_mantissa, 0}, (pair){x_mantissa, 0});
+        return copysign(join(multiply(quotient, DEGREES), difference), y);
+    }
+    const pair angle = angle_of((pair){y_mantissa * power_of_two(difference), 0}, (pair){x_mantissa, 0});
+    return copysign(angle.high + angle.low, y);
+}
+
+/* sqrt(1 - a^2). */
+static pair other_leg(double a) {
+    return root(multiply(two_sum(1, -a), two_sum(1, a)));
+}
+
+double pl_asin(double a) {
+    if (!(fabs(a) <= 1))
+        return NAN;
+    if (fabs(a) < TINY)
+        return a == 0 ? a : scaled(a, DEGREES);
+    if (fabs(a) == 1)
+        return 90 * a;
+    const pair angle = angle_of((pair){fabs(a), 0}, other_leg(a));
+    return copysign(angle.high + angle.low, a);
+}
+
+double pl_acos(double a) {
+    if (!(fabs(a) <= 1))
+        return NAN;
+    if (fabs(a) < 0x1p-60)
+        return 90;
+    if (fabs(a) == 1)
+        return a > 0 ? 0 : 180;
+    const pair angle = angle_of(other_leg(a), (pair){a, 0});
+    return angle.high + angle.low;
+}
+
+/* --- exponential functions --- */
+
+/* e^(x.high + x.low), rounded once, for |x.high| < 800. x = k log 2 + r, |r| < 0.35; e^r by Taylor. */
+static double exponential(pair x, bool negative) {
+    static const double LOG2_1 = 0x1.62e42fefa3800p-1;                                  /* 42 bits: k times it is exact */
+    static const pair LOG2_2 = {0x1.ef35793c76730p-45, 0x1.f97b57a079a19p-103};         /* the rest */
+    static const pair c4 = {0x1.5555555555555p-5, 0x1.5555555555555p-59}, c3 = {0x1.5555555555555p-3, 0x1.5555555555555p-57};
+    const double k = pl_round(x.high * 0x1.71547652b82fep+0);
+    pair r = two_sum(x.high, -k * LOG2_1);
+    r = add(r, add((pair){x.low, 0}, scale_by(LOG2_2, -k)));
+    const double z = r.high;
+    double tail = 1.0 / 355687428096000;
+    static const double coefficients[] = {1.0 / 20922789888000, 1.0 / 1307674368000, 1.0 / 87178291200, 1.0 / 6227020800,
+                                          1.0 / 479001600,      1.0 / 39916800,      1.0 / 3628800,     1.0 / 362880,
+                                          1.0 / 40320,          1.0 / 5040,          1.0 / 720,         1.0 / 120};
+    for (size_t i = 0; i < sizeof coefficients / sizeof *coefficients; i++)
+        tail = coefficients[i] + z * tail;
+    pair sum = add(c4, two_product(z, tail));
+    sum = add(c3, multiply(r, sum));
+    sum = add((pair){0.5, 0}, multiply(r, sum));
+    sum = add((pair){1, 0}, multiply(r, sum));
+    sum = add((pair){1, 0}, multiply(r, sum));
+    return join(negative ? negate(sum) : sum, (int)k);
+}
+
+/* Natural logarithm of finite a > 0: a = 2^k m, log m = 2 atanh((m - 1) / (m + 1)) with m between sqrt(1/2) and sqrt 2. */
+static pair logarithm(double a) {
+    static const pair LOG2 = {0x1.62e42fefa39efp-1, 0x1.abc9e3b39803fp-56};
+    static const pair c2 = {0x1.999999999999ap-3, -0x1.999999999999ap-57}, c3 = {0x1.2492492492492p-3, 0x1.2492492492492p-57};
+    int k;
+    double m = split(a, &k);
+    if (m > 0x1.6a09e667f3bcdp+0) {
+        m /= 2;
+        k++;
+    }
+    const pair s = divide((pair){m - 1, 0}, two_sum(m, 1)), s2 = multiply(s, s);
+    const double z = s2.high;
+    double tail = 1.0 / 35;
+    for (int i = 33; i >= 9; i -= 2)
+        tail = 1.0 / i + z * tail;
+    pair sum = add(c3, two_product(z, tail));
+    sum = add(c2, multiply(s2, sum));
+    sum = add(THIRD, multiply(s2, sum));
+    sum = add(s, multiply(s, multiply(s2, sum)));
+    sum = (pair){2 * sum.high, 2 * sum.low};
+    return k ? add(scale_by(LOG2, k), sum) : sum;
+}
+
+double pl_exp(double a) {
+    if (a != a)
+        return a;
+    if (a > 710)
+        return INFINITY;
+    if (a < -746)
+        return 0;
+    return exponential((pair){a, 0}, false);
+}
+
+double pl_log(double a) {
+    if (!(a > 0))
+        return a == 0 ? -INFINITY : NAN;
+    if (a - a != 0)
+        return a;
+    const pair result = logarithm(a);
+    return result.high + result.low;
+}
+
+double pl_pow(double a, double b) {
+    if (b == 0 || a == 1)
+        return 1;
+    if (a != a || b != b)
+        return NAN;
+    const double size = fabs(a);
+    const bool whole = pl_floor(b) == b, odd = whole && fabs(b) < 0x1p53 && fmod(b, 2) != 0;
+    if (b - b != 0) { /* infinite */
+        if (size == 1)
+            return 1;
+        return (size > 1) == (b > 0) ? INFINITY : 0;
+    }
+    if (size == 0 || size - size != 0) {
+        const double magnitude = (size == 0) == (b > 0) ? 0 : INFINITY;
+        return odd ? copysign(magnitude, a) : magnitude;
+    }
+    if (a < 0 && !whole)
+        return NAN;
+    const bool negative = a < 0 && odd;
+    const pair log_size = logarithm(size);
+    const double estimate = b * log_size.high;
+    if (estimate > 710)
+        return negative ? -INFINITY : INFINITY;
+    if (estimate < -746)
+        return negative ? -0.0 : 0;
+    if (fabs(estimate) < 0x1p-60)
+        return negative ? -1 : 1;
+    /* b may be as large as 2^1023 and the logarithm as small as 2^-53: the product is taken of mantissas. */
+    int exponent;
+    const double mantissa = split(b, &exponent);
+    pair product = scale_by(log_size, mantissa);
+    for (; exponent > 900; exponent -= 900)
+        product = (pair){product.high * 0x1p900, product.low * 0x1p900};
+    for (; exponent < -900; exponent += 900)
+        product = (pair){product.high * 0x1p-900, product.low * 0x1p-900};
+    const double scale = power_of_two(exponent);
+    return exponential((pair){product.high * scale, product.low * scale}, negative);
+}
+
+/* --- rounding and comparing --- */
+
+double pl_floor(double a) {
+    return floor(a);
+}
+
+double pl_ceil(double a) {
+    return ceil(a);
+}
+
+double pl_round(double a) {
+    const double size = fabs(a), below = floor(size);
+    return copysign(size - below >= 0.5 ? below + 1 : below, a);
+}
+
+double pl_modulo(double a, double b) {
+    return fmod(a, b);
+}
+
+double pl_min(double a, double b) {
+    return a < b ? a : b;
+}
+
+double pl_max(double a, double b) {
+    return a > b ? a : b;
+}
+
+/* --- by opcode --- */
+
+static bool apply(int opcode, double a, double b, double c, double *out) {
+    switch (opcode) {
+    case PL_OP_BOOL: *out = a != 0; return true;
+    case PL_OP_ADD: *out = a + b; return true;
+    case PL_OP_SUBTRACT: *out = a - b; return true;
+    case PL_OP_MULTIPLY: *out = a * b; return true;
+    case PL_OP_DIVIDE: *out = a / b; return true;
+    case PL_OP_MODULO: *out = pl_modulo(a, b); return true;
+    case PL_OP_NEGATE: *out = -a; return true;
+    case PL_OP_NOT: *out = a == 0; return true;
+    case PL_OP_LESS: *out = a < b; return true;
+    case PL_OP_LESS_EQUAL: *out = a <= b; return true;
+    case PL_OP_GREATER: *out = a > b; return true;
+    case PL_OP_GREATER_EQUAL: *out = a >= b; return true;
+    case PL_OP_EQUAL: *out = a == b; return true;
+    case PL_OP_NOT_EQUAL: *out = a != b; return true;
+    case PL_OP_ABS: *out = fabs(a); return true;
+    case PL_OP_SIGN: *out = a > 0 ? 1 : a < 0 ? -1 : a == 0 ? 0 : a; return true;
+    case PL_OP_FLOOR: *out = pl_floor(a); return true;
+    case PL_OP_CEIL: *out = pl_ceil(a); return true;
+    case PL_OP_ROUND: *out = pl_round(a); return true;
+    case PL_OP_MIN: *out = pl_min(a, b); return true;
+    case PL_OP_MAX: *out = pl_max(a, b); return true;
+    case PL_OP_CLAMP: *out = pl_min(pl_max(a, b), c); return true;
+    case PL_OP_MIX: *out = a * (1 - c) + b * c; return true;
+    case PL_OP_POW: *out = pl_pow(a, b); return true;
+    case PL_OP_EXP: *out = pl_exp(a); return true;
+    case PL_OP_LOG: *out = pl_log(a); return true;
+    case PL_OP_SQRT: *out = sqrt(a); return true;
+    case PL_OP_SIN: *out = pl_sin(a); return true;
+    case PL_OP_COS: *out = pl_cos(a); return true;
+    case PL_OP_TAN: *out = pl_tan(a); return true;
+    case PL_OP_ASIN: *out = pl_asin(a); return true;
+    case PL_OP_ACOS: *out = pl_acos(a); return true;
+    case PL_OP_ATAN2: *out = pl_atan2(a, b); return true;
+    default: *out = NAN; return false;
+    }
+}
+
+double pl_elementary(int opcode, double a, double b, double c) {
+    double out;
+    apply(opcode, a, b, c, &out);
+    return out;
+}
+
+bool pl_elementary_array(int opcode, size_t n, const double *a, const double *b, const double *c, double *out) {
+    double unused;
+    if (!apply(opcode, 0, 0, 0, &unused))
+        return false;
+    for (size_t i = 0; i < n; i++)
+        apply(opcode, a[i], b ? b[i] : 0, c ? c[i] : 0, &out[i]);
+    return true;
+}
+
+/* --- random numbers on arrays --- */
+
+uint64_t pl_name_hash_of(const char *bytes, size_t length) {
+    return pl_name_hash(bytes, length);
+}
+
+uint64_t pl_seed_key_of(double seed) {
+    return pl_seed_key(seed);
+}
+
+void pl_mix_array(size_t n, const uint64_t *k, const uint64_t *x, uint64_t *out) {
+    for (size_t i = 0; i < n; i++)
+        out[i] = pl_mix(k[i], x[i]);
+}
+
+void pl_bits_array(size_t n, const double *a, uint64_t *out) {
+    for (size_t i = 0; i < n; i++)
+        out[i] = pl_bits(a[i]);
+}
+
+void pl_rand_array(size_t n, const uint64_t *key, const uint64_t *stream_bits, const uint64_t *ordinal, double *out) {
+    for (size_t i = 0; i < n; i++)
+        out[i] = pl_rand(key[i], stream_bits[i], ordinal[i]);
+}
+
+void pl_hash_array(size_t n, uint64_t seed_key, size_t count, const double *arguments, double *out) {
+    for (size_t i = 0; i < n; i++)
+        out[i] = pl_hash(seed_key, count, arguments + i * count);
+}
