@@ -35,12 +35,16 @@ const BETWEEN = {
   '-': [token.immediate(prec(1, '-')), /-\s/],
 };
 
-// POV-Ray directives that plsys doesn't have; each is one token up to the end of its line.
-const UNSUPPORTED = [
-  'break', 'case', 'debug', 'default', 'define', 'else', 'elseif', 'end', 'error', 'fclose', 'fopen', 'for',
-  'if', 'ifdef', 'ifndef', 'macro', 'range', 'read', 'render', 'statistics', 'switch', 'undef', 'version',
-  'warning', 'while', 'write',
+// POV-Ray's directives that plsys doesn't have, each one token: those with a condition or parameters in brackets,
+// those that fill a line, and words alone.
+const DIRECTIVE_WITH_BRACKETS = ['case', 'elseif', 'for', 'if', 'ifdef', 'ifndef', 'macro', 'range', 'switch', 'while'];
+const DIRECTIVE_LINE = [
+  'debug', 'default', 'define', 'error', 'fclose', 'fopen', 'read', 'render', 'statistics', 'undef', 'version',
+  'warning', 'write',
 ];
+
+// Bracketed text in a line, up to three deep.
+const BRACKETS = [1, 2].reduce((inner) => `\\(([^()\\r\\n]|${inner})*\\)`, '\\([^()\\r\\n]*\\)');
 
 const oneOf = (rules) => (rules.length > 1 ? choice(...rules) : rules[0]);
 
@@ -105,7 +109,7 @@ export default grammar({
 
     parameter: ($) => prec.right(seq(
       'Parameter',
-      field('name', $.name),
+      optional(field('name', $.name)),
       optional(seq('=', field('value', $._expression))),
       optional(field('range', $.range)),
       optional(field('text', $.string)),
@@ -139,7 +143,7 @@ export default grammar({
 
     selection: ($) => prec.right(seq(
       'Selection',
-      field('name', $.name),
+      optional(field('name', $.name)),
       optional(field('parameters', $.parameters)),
       optional(field('body', $.selection_body)),
     )),
@@ -202,23 +206,34 @@ export default grammar({
 
     calculation: ($) => prec.right(seq(
       'Calculation',
-      field('name', $.name),
+      optional(field('name', $.name)),
       optional(field('parameters', $.parameters)),
       optional(field('body', $.statements)),
     )),
 
     transformation: ($) => prec.right(seq(
       'Transformation',
-      field('name', $.name),
+      optional(field('name', $.name)),
       optional(field('parameters', $.parameters)),
       optional(field('body', $.statements)),
     )),
 
     statements: ($) => prec.right(seq(
       '{',
-      repeat(choice($._statement, $.block, alias(choice(';', ','), $.stray))),
+      repeat($._statements_part),
       optional('}'),
     )),
+
+    // Scene blocks, `if` and braces have no place here; they parse so that the reader can say so.
+    _statements_part: ($) => choice(
+      $._statement,
+      $.block,
+      $.guard,
+      alias($.braced_statements, $.braced),
+      alias(choice(';', ','), $.stray),
+    ),
+
+    braced_statements: ($) => prec.right(seq('{', repeat($._statements_part), optional('}'))),
 
     _statement: ($) => choice($.assignment, $.step, $.operation),
 
@@ -287,7 +302,8 @@ export default grammar({
 
     // --- tokens; malformed ones (`2x`, `.5`, an unclosed string) are whole, for the reader to explain
 
-    name: (_) => /[A-Za-z_][A-Za-z0-9_]*/,
+    // Letters outside of ASCII are for the reader to complain about, once a name.
+    name: (_) => /[A-Za-z_\u00C0-\u1FFF\u2C00-\uD7FF][A-Za-z0-9_\u00C0-\u1FFF\u2C00-\uD7FF]*/,
 
     number: (_) => token(choice(
       /[0-9]+(\.[0-9]+)?[eE][+-][0-9]+[A-Za-z0-9_.]*/,
@@ -302,7 +318,8 @@ export default grammar({
     )),
 
     directive: (_) => token(choice(
-      new RegExp(`#[ \\t]*(${UNSUPPORTED.join('|')})([^A-Za-z0-9_\\r\\n][^\\r\\n]*)?`),
+      new RegExp(`#[ \\t]*(${DIRECTIVE_WITH_BRACKETS.join('|')})([ \\t]+[A-Za-z0-9_]+)?[ \\t]*${BRACKETS}`),
+      new RegExp(`#[ \\t]*(${DIRECTIVE_LINE.join('|')})([^A-Za-z0-9_\\r\\n][^\\r\\n]*)?`),
       /#[ \t]*[A-Za-z0-9_]*/,
     )),
   },

@@ -1,5 +1,5 @@
-"""What the grammar can't accept: bytes that aren't text, unclosed comments, unknown words, and the places where
-tree-sitter gave up (ERROR) or filled a gap (MISSING).
+"""What the grammar doesn't accept: bytes that aren't text, unclosed comments, directives and words that plsys
+doesn't have, and the places where tree-sitter gave up (ERROR) or filled a gap (MISSING).
 
 Example: ``first_error(reading, node)`` on ``camera { location @ }`` is the diagnostic
 "the character '@' has no meaning here".
@@ -8,10 +8,11 @@ Example: ``first_error(reading, node)`` on ``camera { location @ }`` is the diag
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from .codes import CODES
 from .diagnostics import Diagnostic, Diagnostics, nearest
+from .grammar import language
 from .source import Source, Span
 
 if TYPE_CHECKING:
@@ -21,20 +22,29 @@ if TYPE_CHECKING:
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 DEFINITION_WORDS = ("Selection", "Calculation", "Transformation", "Texture", "Parameter")
-_CLOSERS = {")": "(", "}": "{", "]": "[", ">": "<"}
-# What may stand in a file outside of strings and comments.
-_KNOWN = re.compile(r"[A-Za-z0-9_\s\"#%&()*+,\-./:;<=>?\[\]{|}!→]")
+CLOSERS = {")": "(", "}": "{", "]": "[", ">": "<"}
 
-# By the kind of node that an error stands in: what was expected there.
+DEFINITION = (
+    "a definition starts with Selection, Calculation, Transformation, Texture, Parameter, #declare, #include "
+    "or a block: camera { … }"
+)
+RULE = "a rule looks like Name -> operators operand + …;"
+STATEMENT = "a statement looks like count = 2; or --count; or trans 0 0 1;"
+
+# What was expected, by the kind of node that an error stands in.
 _EXPECTED = {
-    "source_file": "a definition starts with Selection, Calculation, Transformation, Texture, Parameter, "
-    "#declare or a block's name: camera { … }",
-    "selection_body": "a rule looks like Name -> operators operand + …;",
-    "rule": "a rule looks like Name -> operators operand + …;",
-    "statements": "a statement looks like count = 2; or --count; or trans 0 0 1;",
+    "source_file": DEFINITION,
+    "selection": "a Selection looks like Selection Name { Name -> …; }",
+    "selection_body": RULE,
+    "rule": RULE,
+    "entry": RULE,
+    "calculation": "a Calculation looks like Calculation Name { --count; }",
+    "transformation": "a Transformation looks like Transformation Name { trans 0 0 1; }",
+    "statements": STATEMENT,
     "block_body": "a block holds names, values and blocks: camera { location <0, 1, 2> }",
     "guard": "a condition looks like if (count > 0 && height < 2)",
-    "vector": "a vector looks like <x, y, z>; comparisons in it stand in brackets",
+    "vector": "a vector looks like <x, y, z>, with a comma between two values",
+    "call": "a call looks like max(a, b), with a comma between two values",
     "range": "a range looks like [0 to 20]",
     "parameter": 'a Parameter looks like Parameter age = 10 [0 to 20] "Years";',
     "parameters": "parameters look like Branch(length, width)",
@@ -42,58 +52,108 @@ _EXPECTED = {
     "include": 'an include looks like #include "forest.plsys"',
 }
 
+# What may stand outside of strings and comments.
+_KNOWN = re.compile(r"[A-Za-z0-9_\s\"%()*+,\-./:;<=>?\[\]{}!&|→\u00C0-\u1FFF\u2C00-\uD7FF]")
+
+# Strings and comments inside broken text, of which only the rest is judged.
+_MASKED = re.compile(r'"[^"\r\n]*"|//[^\r\n]*|/\*.*?\*/', re.DOTALL)
+
+# Habits from other languages: the text that went wrong → message and hint.
+_HABITS = (
+    (re.compile(r"\*/"), "this '*/' ends no comment", "comments don't nest: the first */ ended it"),
+    (re.compile(r"\^"), "'^' is no operator", "write pow(a, b)"),
+    (re.compile(r"\band\b"), "'and' is no operator", "write &&"),
+    (re.compile(r"\bor\b"), "'or' is no operator", "write ||"),
+    (re.compile(r"\bnot\b"), "'not' is no operator", "write !"),
+    (re.compile(r"(?<![&])&(?!&)"), "'&' is no operator", "write &&"),
+    (re.compile("[−–—]"), "this dash is not the minus sign", "write -"),
+    (re.compile("[“”„«»]|'"), "this is not the quotation mark of a text", 'write "'),
+)
+
+# Directives: what to do instead.
+_INSTEAD = {
+    "while": "a Selection repeats: Selection Row { if (n > 0) Row -> …; }",
+    "for": "a Selection repeats: Selection Row { if (n > 0) Row -> …; }",
+    "macro": "a Selection with parameters is plsys' macro: Selection Leaf(size) { Leaf(size) -> …; }",
+    "if": "a Selection chooses: if (n > 0) A -> …; else A -> …;",
+    "switch": "a Selection chooses: if (n > 0) A -> …; else A -> …;",
+    "define": "#declare Name = … gives a value a name",
+}
+_CONTINUING = ("else", "elseif", "end", "case", "range", "break")
+_DIRECTIVES = ("declare", "include")
+
 
 def clean(source: Source, diagnostics: Diagnostics) -> bytes:
     """The bytes to parse: like the source's, but with spaces for a byte order mark, for NUL bytes and for bytes
     that aren't UTF-8 (both reported, at the first one), so that every offset stays what it is."""
     data = source.data
     if data.startswith(BYTE_ORDER_MARK):
-        data = b"   " + data[3:]
+        data = b"   " + data[len(BYTE_ORDER_MARK) :]
     try:
         data.decode()
     except UnicodeDecodeError as error:
         span = Span(source, error.start, error.start + 1)
-        diagnostics.add("encoding", span, f"the byte 0x{data[error.start]:02x} is not UTF-8 text",
-                        "save the file as UTF-8")
-        # A replaced byte is one character, so every bad byte becomes exactly one space.
-        data = data.decode("utf-8", "surrogateescape")
-        data = re.sub("[\udc80-\udcff]", " ", data).encode()
+        message = f"the byte 0x{data[error.start]:02x} is not UTF-8 text"
+        diagnostics.add("encoding", span, message, "save the file as UTF-8")
+        escaped = data.decode(errors="surrogateescape")
+        data = re.sub("[\udc80-\udcff]", " ", escaped).encode()
     if b"\0" in data:
         at = data.index(b"\0")
-        diagnostics.add("encoding", Span(source, at, at + 1), "a NUL byte stands in the text",
-                        "remove it; or is this no text file?")
+        hint = "remove it, or is this not a text file?"
+        diagnostics.add("encoding", Span(source, at, at + 1), "a NUL byte stands in the text", hint)
         data = data.replace(b"\0", b" ")
     return data
 
 
-def comments(reading: Reading, tree: Tree) -> None:
-    """Report a comment that the end of the file cuts off, and directives that plsys doesn't have."""
-    pass
+def extras(reading: Reading, tree: Tree) -> None:
+    """Report what may stand anywhere: a comment that the end of the file cuts off, and unknown directives."""
+    from tree_sitter import Query, QueryCursor
+
+    found = QueryCursor(Query(language(), "(directive) @directive")).captures(tree.root_node)
+    seen = False
+    for node in sorted(found.get("directive", []), key=lambda node: node.start_byte):
+        _directive(reading, node, seen)
+        seen = True
+    last = tree.root_node.children[-1] if tree.root_node.children else None
+    while last is not None and last.type != "comment":
+        last = last.children[-1] if last.children else None
+    if last is not None and _is_unclosed_comment(reading.text(last)):
+        reading.complain(Span(reading.source, last.start_byte, last.start_byte + 2), "this comment is never closed",
+                         "add */ where it ends", "unclosed")
 
 
-def unknown_definition(word: str) -> tuple[str, str]:
-    """Message and hint for ``Selction Tree { … }``."""
-    hint = nearest(word.capitalize(), DEFINITION_WORDS)
-    return f"'{word}' defines nothing", hint or "Selection, Calculation, Transformation and Texture do"
+def _is_unclosed_comment(text: str) -> bool:
+    return text.startswith("/*") and not (len(text) >= 4 and text.endswith("*/"))
 
 
-def stray_in_block(text: str) -> tuple[str, str]:
-    """Message and hint for a token that has no place in a scene block."""
-    if text in ("->", "=>"):
-        return f"'{text}' can't stand in a scene block", "rules stand in a Selection: Selection Name { Name -> …; }"
-    if text in (";", ":", "="):
-        return f"'{text}' can't stand in a scene block", "remove it: items stand side by side, camera { angle 45 }"
-    return f"'{text}' can't stand in a scene block", "comparisons stand in brackets, statements in a Calculation"
+def _directive(reading: Reading, node: Node, seen: bool) -> None:
+    word = re.match(r"#[ \t]*(\w*)", reading.text(node))
+    if seen and word[1] in _CONTINUING:
+        return  # belongs to a directive that has been reported
+    span = Span(reading.source, node.start_byte, node.start_byte + len(word[0].encode()))
+    if not word[1]:
+        reading.complain(span, "a directive's name is missing after this '#'", "plsys has #declare and #include")
+        return
+    hint = nearest(word[1], _DIRECTIVES) or _INSTEAD.get(word[1], "remove it; plsys has #declare and #include")
+    reading.complain(span, f"#{word[1]} isn't supported", hint.replace("'", "'#", 1) if "mean" in hint else hint,
+                     "unsupported")
 
 
-def first_error(reading: Reading, node: Node) -> Diagnostic | None:
-    """The message for the first place in ``node`` where the text doesn't follow the grammar."""
+class Break(NamedTuple):
+    """Where a definition stops following the grammar."""
+
+    diagnostic: Diagnostic
+    is_gap: bool  # one token is missing, and all others are where they belong
+
+
+def first_error(reading: Reading, node: Node, end: int | None = None) -> Break | None:
+    """The first place in ``node`` (before the byte ``end``) where the text doesn't follow the grammar."""
     broken = _first_broken(node)
-    if broken is None:
+    if broken is None or (end is not None and broken.start_byte >= end):
         return None
     if broken.is_missing:
-        return _missing(reading, broken)
-    return _unexpected(reading, broken)
+        return Break(_missing(reading, broken), True)
+    return Break(unexpected(reading, broken), False)
 
 
 def _first_broken(node: Node) -> Node | None:
@@ -109,47 +169,88 @@ def _diagnostic(code: str, span: Span, message: str, hint: str) -> Diagnostic:
 
 
 def _missing(reading: Reading, node: Node) -> Diagnostic:
-    """A token that tree-sitter put in."""
+    """The message for a token that tree-sitter put in."""
     parent = node.parent
-    if node.type in _CLOSERS:
-        opener = _CLOSERS[node.type]
-        for child in parent.children:
-            if child.type == opener:
-                return _diagnostic("unclosed", reading.span(child), f"this '{opener}' is never closed",
-                                   f"add the '{node.type}' that belongs to it")
+    if node.type in CLOSERS:
+        opener = next((child for child in parent.children if child.type == CLOSERS[node.type]), None)
+        if opener is not None:
+            return never_closed(reading, opener.start_byte, opener.type, node.type)
     what = {"name": "a name", "number": "a value", "string": "a text in quotes"}.get(node.type, f"'{node.type}'")
-    hint = _EXPECTED.get(parent.type, "")
-    return _diagnostic("missing", reading.after(_end_before(reading, node)), f"{what} is missing here", hint)
+    end = len(reading.data[: node.start_byte].rstrip())
+    return _diagnostic("missing", reading.after(end), f"{what} is missing here", _expected(parent))
 
 
-def _end_before(reading: Reading, node: Node) -> int:
-    """Where the text before ``node`` ends, leaving out space."""
-    return len(reading.data[: node.start_byte].rstrip())
+def never_closed(reading: Reading, offset: int, opener: str, closer: str) -> Diagnostic:
+    span = Span(reading.source, offset, offset + len(opener))
+    hint = f"add the '{closer}' that belongs to it"
+    return _diagnostic("unclosed", span, f"this '{opener}' is never closed", hint)
 
 
-def _unexpected(reading: Reading, node: Node) -> Diagnostic:
-    text = reading.text(node)
-    children = node.children
-    # A character that belongs to no token stands between the tokens that tree-sitter did find.
-    position = node.start_byte
-    for child in [*children, None]:
-        gap_end = child.start_byte if child is not None else node.end_byte
-        gap = reading.data[position:gap_end].decode(errors="replace")
-        for i, character in enumerate(gap):
-            if not _KNOWN.match(character):
-                start = position + len(gap[:i].encode())
-                span = Span(reading.source, start, start + len(character.encode()))
-                return _diagnostic("syntax", span, f"the character '{character}' has no meaning here",
-                                   "names are made of the letters A to Z, digits and '_'" if character.isalpha() else "remove it")
-        if child is not None:
-            position = child.end_byte
-    word = text.split()[0] if text.split() else text
-    if len(word) > 20:
-        word = word[:20] + "…"
-    parent = node.parent
-    hint = ""
-    while parent is not None and not hint:
-        hint = _EXPECTED.get(parent.type, "")
-        parent = parent.parent
-    span = Span(reading.source, node.start_byte, min(node.end_byte, node.start_byte + max(1, len(word.encode()))))
-    return _diagnostic("syntax", span, f"'{word}' is unexpected here", hint)
+def _expected(node: Node | None) -> str:
+    """What was expected in ``node`` or around it."""
+    while node is not None:
+        if node.type in _EXPECTED:
+            return _EXPECTED[node.type]
+        node = node.parent
+    return DEFINITION
+
+
+def unexpected(reading: Reading, node: Node) -> Diagnostic:
+    """The message for an ERROR node."""
+    text = _MASKED.sub(lambda match: " " * len(match[0].encode()), reading.text(node))
+    for pattern, message, hint in _HABITS:
+        if match := pattern.search(text):
+            return _diagnostic("syntax", _part(reading, node, match), message, hint)
+    for match in re.finditer(r".", text):
+        if not _KNOWN.match(match[0]):
+            message = f"the character '{match[0]}' has no meaning here"
+            return _diagnostic("syntax", _part(reading, node, match), message, "remove it")
+    match = re.search(r"\w+|[^\w\s]+", text) or re.search(r"\s*", text)
+    hint = _expected(node.parent)
+    return _diagnostic("syntax", _part(reading, node, match), f"'{match[0][:30]}' is unexpected here", hint)
+
+
+def _part(reading: Reading, node: Node, match: re.Match[str]) -> Span:
+    """The place of a match in the node's text."""
+    start = node.start_byte + len(match.string[: match.start()].encode())
+    return Span(reading.source, start, min(start + len(match[0].encode()), len(reading.data)))
+
+
+def unmatched_bracket(reading: Reading, tree: Tree) -> Diagnostic | None:
+    """The innermost bracket that is never closed, for a text of which the parser could make nothing at all."""
+    open_brackets: list[Node] = []
+    cursor = tree.walk()
+    while True:
+        kind = cursor.node.type
+        if kind in CLOSERS.values():
+            open_brackets.append(cursor.node)
+        elif kind in CLOSERS and open_brackets and open_brackets[-1].type == CLOSERS[kind]:
+            open_brackets.pop()
+        if cursor.goto_first_child() or cursor.goto_next_sibling():
+            continue
+        while cursor.goto_parent():
+            if cursor.goto_next_sibling():
+                break
+        else:
+            break
+    if not open_brackets:
+        return None
+    opener = open_brackets[-1]
+    closer = next(closer for closer, other in CLOSERS.items() if other == opener.type)
+    return never_closed(reading, opener.start_byte, opener.type, closer)
+
+
+def unknown_definition(word: str) -> tuple[str, str]:
+    """Message and hint for ``Selction Tree { … }``."""
+    hint = nearest(word.capitalize(), DEFINITION_WORDS)
+    return f"'{word}' defines nothing", hint or "Selection, Calculation, Transformation and Texture do"
+
+
+def stray_in_block(text: str) -> tuple[str, str]:
+    """Message and hint for a token that has no place in a scene block."""
+    message = f"'{text}' can't stand in a scene block"
+    if text in ("->", "=>"):
+        return message, "rules stand in a Selection: Selection Name { Name -> …; }"
+    if text in (";", ":", "="):
+        return message, "remove it: items stand side by side, camera { angle 45 }"
+    return message, "comparisons stand in brackets, statements in a Calculation"

@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING
 from . import mistakes, syntax
 from .diagnostics import Diagnostics
 from .grammar import syntax_tree
-from .parse_rules import RULE_EXAMPLE, selection_body
+from .parse_rules import selection_body
 from .parse_values import (
     MAX_DEPTH,
+    Abandon,
     Reading,
     TooDeep,
     expression,
@@ -33,63 +34,115 @@ from .source import Source, Span
 if TYPE_CHECKING:
     from tree_sitter import Node, Tree
 
+# More messages than this about one definition help nobody.
+MAX_MESSAGES = 10
+
 
 def parse(source: Source) -> tuple[syntax.File, Diagnostics]:
     """The syntax tree of ``source``, and the syntax errors in file order. Never raises for what the text holds."""
     diagnostics = Diagnostics()
     text = mistakes.clean(source, diagnostics)
-    return convert(source, syntax_tree(text), diagnostics)
+    return convert(source, text, syntax_tree(text), diagnostics), diagnostics
 
 
-def convert(source: Source, tree: Tree, diagnostics: Diagnostics) -> tuple[syntax.File, Diagnostics]:
-    """The syntax tree from tree-sitter's; for callers that keep ``tree`` up to date themselves (an editor's
-    server, by ``grammar.syntax_tree(text, old_tree)``). Adds to ``diagnostics``."""
-    reader = _FileReader(source, diagnostics)
-    for node in tree.root_node.children:
-        reader.definition(node)
-    mistakes.comments(reader.reading, tree)
+def convert(source: Source, text: bytes, tree: Tree, diagnostics: Diagnostics) -> syntax.File:
+    """The syntax tree from tree-sitter's tree of ``text``, which is ``mistakes.clean(source, …)``; syntax errors go to
+    ``diagnostics``. For callers that keep the tree up to date by ``grammar.syntax_tree(text, old_tree)``."""
+    reader = _FileReader(source, text, diagnostics)
+    reader.file(tree)
+    mistakes.extras(reader.reading, tree)
     diagnostics.items[:] = diagnostics.sorted()
-    span = Span(source, 0, len(source.data))
-    return syntax.File(span, tuple(reader.definitions)), diagnostics
+    return syntax.File(Span(source, 0, len(source.data)), tuple(reader.definitions))
 
 
 class _FileReader:
     """Collects the definitions of one file."""
 
-    def __init__(self, source: Source, diagnostics: Diagnostics) -> None:
-        self.reading = Reading(source, diagnostics)
+    def __init__(self, source: Source, text: bytes, diagnostics: Diagnostics) -> None:
+        self.reading = Reading(source, text, diagnostics)
         self.definitions: list[syntax.Definition] = []
         self.hoisted: list[Node] = []
+        # The last definition that broke: what follows it, up to the next one that starts a line no deeper, may be
+        # its debris, of which nothing is said.
+        self.broken: Node | None = None
+
+    def file(self, tree: Tree) -> None:
+        items = self.reading.diagnostics.items
+        root = tree.root_node
+        before = len(items)
+        for node in root.children:
+            self.definition(node)
+        if root.has_error and len(items) == before:
+            found = mistakes.unmatched_bracket(self.reading, tree) or mistakes.unexpected(self.reading, root)
+            items.append(found)
 
     def definition(self, node: Node) -> None:
-        """Read one child of the file's root. Of a broken one, what stands before the break is reported and the
-        break itself, but nothing after it: that may only follow from the break."""
+        """Read one child of the file's root, or a definition found inside of a broken one."""
+        if self.broken is not None:
+            if node.type not in _DEFINITIONS or not self.starts_afresh(node):
+                return
+            self.broken = None
+        if node.type == "ERROR":
+            self.broken_file(node)
+        elif node.type == "stray":
+            text = self.reading.text(node)
+            self.reading.complain(node, f"this '{text}' {'ends' if text in ';,' else 'closes'} nothing", "remove it")
+            self.broken = node
+        elif node.type in _DEFINITIONS:
+            self.one_definition(node)
+
+    def starts_afresh(self, node: Node) -> bool:
+        """Whether ``node`` begins a line, no deeper than the definition that broke."""
+        column = node.start_point[1]
+        before = self.reading.data[node.start_byte - column : node.start_byte]
+        return not before.strip() and (column == 0 or column <= self.broken.start_point[1])
+
+    def broken_file(self, node: Node) -> None:
+        """Text between definitions, perhaps with some that tree-sitter recognised inside."""
+        items = self.reading.diagnostics.items
+        inside = [child for child in node.children if child.type in _DEFINITIONS]
+        error = mistakes.unexpected(self.reading, node)
+        if not inside or error.span.start < inside[0].start_byte:
+            items.append(error)
+            self.broken = node
+        for child in inside:
+            self.definition(child)
+
+    def one_definition(self, node: Node) -> None:
         items = self.reading.diagnostics.items
         before = len(items)
-        read = _DEFINITIONS.get(node.type)
-        if node.type == "stray":
-            self.reading.complain(node, f"this '{self.reading.text(node)}' closes nothing", "remove it")
-        elif node.type == "ERROR":
-            for child in node.children:
-                if child.type in _DEFINITIONS:
-                    self.definition(child)
-        elif read is not None:
-            try:
-                found = read(self, node)
-            except TooDeep as error:
-                self.reading.complain(error.span, "this is nested too deeply", f"the limit is {MAX_DEPTH} levels")
-                return
-            if found is not None:
-                self.definitions.append(found)
-        if node.has_error:
-            error = mistakes.first_error(self.reading, node)
-            if error is not None:
-                items[before:] = [item for item in items[before:] if item.span.start < error.span.start]
-                items.append(error)
+        try:
+            found = _DEFINITIONS[node.type](self, node)
+        except Abandon as error:
+            items[before:] = []
+            self.reading.complain(error.span, error.message, error.hint)
+            found = None
+            self.broken = node
+        if found is not None:
+            self.definitions.append(found)
         hoisted, self.hoisted = self.hoisted, []
+        if node.has_error and self.broken is None:
+            self.report_break(node, before, hoisted[0].start_byte if hoisted else None)
+        items[before + MAX_MESSAGES :] = []
         for child in hoisted:
             if self.is_sibling(child):
                 self.definition(child if child.type == "block" else self.block_of_entry(child))
+
+    def report_break(self, node: Node, before: int, end: int | None) -> None:
+        """Add the place where ``node`` breaks to its messages, from ``before`` on, and leave out those that may
+        only follow from it: later ones, and braces that the broken text may have swallowed."""
+        items = self.reading.diagnostics.items
+        found = mistakes.first_error(self.reading, node, end)
+        if found is None or (found.is_gap and any(item.span.start == found.diagnostic.span.start for item in items)):
+            return
+        place = found.diagnostic.span
+        kept = [item for item in items[before:] if item.span.start < place.start]
+        if not found.is_gap:
+            kept = [item for item in kept if item.code != "unclosed" or item.span.text != "{"]
+            self.broken = node
+        if not any(item.span.start_position.line == place.start_position.line for item in kept):
+            kept.append(found.diagnostic)
+        items[before:] = kept
 
     # --- scene blocks
 
@@ -115,16 +168,18 @@ class _FileReader:
 
     def parameter(self, node: Node) -> syntax.ParameterDeclaration | None:
         reading = self.reading
-        target = node.child_by_field_name("name")
+        target = self.name_of(node, "Parameter age = 1;")
+        if target is None:
+            return None
         value = expression(reading, node.child_by_field_name("value"))
         if value is None:
-            reading.complain(node, f"Parameter {reading.text(target)} has no value",
-                             f"write Parameter {reading.text(target)} = 1;", "missing")
+            reading.complain(node, f"Parameter {target.name} has no value", f"write Parameter {target.name} = 1;",
+                             "missing")
             return None
         low, high = self.range(node.child_by_field_name("range"))
         text = string(reading, node.child_by_field_name("text"))
         reading.need_semicolon(node, "this Parameter")
-        return syntax.ParameterDeclaration(reading.span(node), name(reading, target), value, low, high, text)
+        return syntax.ParameterDeclaration(reading.span(node), target, value, low, high, text)
 
     def range(self, node: Node | None) -> tuple[syntax.Expression | None, syntax.Expression | None]:
         if node is None:
@@ -136,24 +191,32 @@ class _FileReader:
         low = expression(self.reading, node.child_by_field_name("low"))
         return low, expression(self.reading, node.child_by_field_name("high"))
 
-    def named_block(self, node: Node) -> syntax.Texture | None:
+    def named_block(self, node: Node) -> syntax.Texture | syntax.Block | None:
         """``Texture Name { … }``. Any other word there is a misspelt one."""
         reading = self.reading
-        kind = node.child_by_field_name("kind")
+        kind, target, body = (node.child_by_field_name(field) for field in ("kind", "name", "body"))
+        if broken := next((child for child in node.children if child.is_error), None):
+            # Stray words before a block, of which the last became the block's kind.
+            error = mistakes.unexpected(reading, broken)
+            if error.hint == mistakes.DEFINITION:
+                reading.complain(kind, f"'{reading.text(kind)}' is unexpected here", error.hint)
+            else:
+                reading.diagnostics.items.append(error)
+            block_name = name(reading, target)
+            return syntax.Block(reading.span(target).to(reading.span(body)), block_name, self.items(self.inside(body), 0))
         if reading.text(kind) != "Texture":
-            reading.complain(kind, *mistakes.unknown_definition(reading.text(kind)))
+            if not body.has_error or reading.text(body).startswith("{"):
+                reading.complain(kind, *mistakes.unknown_definition(reading.text(kind)))
+                self.broken = node
             return None
-        return self.texture(node, kind, node.child_by_field_name("name"), node.child_by_field_name("body"))
-
-    def texture(self, node: Node, kind: Node, target: Node, body: Node) -> syntax.Texture:
-        span = self.reading.span(node)
-        block = syntax.Block(span, syntax.Name(self.reading.span(kind), "texture"), self.items(self.inside(body), 0))
-        return syntax.Texture(span, name(self.reading, target), block)
+        span = reading.span(node)
+        block = syntax.Block(span, syntax.Name(reading.span(kind), "texture"), self.items(self.inside(body), 0))
+        return syntax.Texture(span, name(reading, target), block)
 
     def block(self, node: Node, depth: int = 0) -> syntax.Block:
         if depth > MAX_DEPTH:
             raise TooDeep(self.reading.span(node))
-        target, body = node.children
+        target, body = node.child_by_field_name("name"), node.child_by_field_name("body")
         return syntax.Block(self.reading.span(node), name(self.reading, target), self.items(self.inside(body), depth))
 
     def items(self, nodes: list[Node], depth: int) -> tuple[syntax.Item, ...]:
@@ -182,31 +245,45 @@ class _FileReader:
 
     def selection(self, node: Node) -> syntax.Selection | None:
         target, body = self.header(node, "Name -> …;")
+        if target is None:
+            return None
         parameters = self.parameters(node)
-        entry, productions = (None, [])
+        entry, productions = None, []
         if body is not None:
+            before = len(self.reading.diagnostics.items)
             nodes = self.inside(body)
-            entry, productions = selection_body(self.reading, nodes, target.name, lambda _, block, depth: self.block(block, depth))
-            if not productions and not node.has_error:
-                self.reading.complain(target.span, f"Selection {target.name} has no rule", RULE_EXAMPLE, "missing")
+            entry, productions = selection_body(self.reading, nodes, target.name, self.block)
+            if not productions and not node.has_error and len(self.reading.diagnostics.items) == before:
+                self.reading.complain(target.span, f"Selection {target.name} has no rule", mistakes.RULE, "missing")
         return syntax.Selection(self.reading.span(node), target, parameters, entry, tuple(productions))
 
-    def calculation(self, node: Node) -> syntax.Calculation:
+    def calculation(self, node: Node) -> syntax.Calculation | None:
         target, found = self.statements(node, "--count;")
-        return syntax.Calculation(self.reading.span(node), target, found)
+        return target and syntax.Calculation(self.reading.span(node), target, found)
 
-    def transformation(self, node: Node) -> syntax.Transformation:
+    def transformation(self, node: Node) -> syntax.Transformation | None:
         target, found = self.statements(node, "trans 0 0 1;")
-        return syntax.Transformation(self.reading.span(node), target, found)
+        return target and syntax.Transformation(self.reading.span(node), target, found)
 
     def header(self, node: Node, example: str) -> tuple[syntax.Name, Node | None]:
         """Name and body of a definition; complains when the body is missing."""
-        target = name(self.reading, node.child_by_field_name("name"))
+        keyword = node.children[0]
+        target = self.name_of(node, f"{keyword.type} Name {{ {example} }}")
         body = node.child_by_field_name("body")
-        if body is None and not node.has_error:
-            self.reading.complain(self.reading.after(node.end_byte), f"{node.children[0].type} {target.name} has no body",
-                                  f"write {node.children[0].type} {target.name} {{ {example} }}", "missing")
+        if body is None and not node.has_error and target is not None:
+            self.reading.complain(self.reading.after(node.end_byte), f"{keyword.type} {target.name} has no body",
+                                  f"write {keyword.type} {target.name} {{ {example} }}", "missing")
         return target, body
+
+    def name_of(self, node: Node, example: str) -> syntax.Name | None:
+        """The name after a definition's keyword; complains when there is none."""
+        target = node.child_by_field_name("name")
+        if target is not None:
+            return name(self.reading, target)
+        keyword = node.children[0]
+        if not node.has_error:
+            self.reading.complain(keyword, f"this {keyword.type} has no name", f"write {example}", "missing")
+        return None
 
     def parameters(self, node: Node) -> tuple[syntax.Name, ...]:
         parameters = node.child_by_field_name("parameters")
@@ -215,25 +292,38 @@ class _FileReader:
         need_parenthesis(self.reading, parameters, parameters.children[0])
         return tuple(name(self.reading, child) for child in parameters.named_children if child.type == "name")
 
-    def statements(self, node: Node, example: str) -> tuple[syntax.Name, tuple[syntax.Statement, ...]]:
+    def statements(self, node: Node, example: str) -> tuple[syntax.Name | None, tuple[syntax.Statement, ...]]:
+        """Name and statements of a Calculation or Transformation."""
         target, body = self.header(node, example)
         keyword = node.children[0].type
         if self.parameters(node):
             self.reading.complain(node.child_by_field_name("parameters"), f"a {keyword} has no parameters",
                                   "only a Selection has; a Calculation assigns to names: { a = 1; }")
-        if body is None:
+        if body is None or target is None:
             return target, ()
+        before = len(self.reading.diagnostics.items)
         nodes = self.inside(body)
         for child in nodes:
-            if child.type == "stray":
-                self.reading.complain(child, f"this '{self.reading.text(child)}' ends nothing", "remove it")
-            elif child.type == "block":
-                self.reading.complain(child, f"a scene block can't stand in a {keyword}", f"write statements: {example}")
+            self.complain_foreign(child, keyword, example)
         found = statements(self.reading, nodes)
-        if not found and not node.has_error:
+        if not found and not node.has_error and len(self.reading.diagnostics.items) == before:
             self.reading.complain(target.span, f"{keyword} {target.name} holds nothing",
                                   f"write {keyword} {target.name} {{ {example} }}", "missing")
         return target, found
+
+    def complain_foreign(self, node: Node, keyword: str, example: str) -> None:
+        """Complain about what parses inside of statements but has no place there."""
+        if node.type == "stray":
+            text = self.reading.text(node)
+            self.reading.complain(node, f"this '{text}' {'ends' if text == ';' else 'separates'} nothing", "remove it")
+        elif node.type == "block":
+            self.reading.complain(node.children[0], f"a scene block can't stand in a {keyword}",
+                                  f"write statements: {example}")
+        elif node.type == "guard" and node.children[0].type != "else":
+            self.reading.complain(node.children[0], f"'{node.children[0].type}' can't stand in a {keyword}",
+                                  "write a = test ? b : c; or let a Selection choose between two of them")
+        elif node.type == "braced":
+            self.reading.complain(node.children[0], f"statements in a {keyword} don't nest", "remove the inner braces")
 
     # --- braces
 
@@ -245,12 +335,29 @@ class _FileReader:
         children = body.children
         if children[-1].type == "}" and not children[-1].is_missing:
             return children
-        self.reading.never_closed(body.start_byte, "{", "}")
-        for i, child in enumerate(children):
-            if i > 0 and self.is_sibling(child):
-                self.hoisted += children[i:]
-                return children[:i]
-        return children
+        if children[0].is_missing:
+            return []
+        own = next((i for i, child in enumerate(children) if i > 0 and self.is_sibling(child)), len(children))
+        self.hoisted += children[own:]
+        self.reading.never_closed(self.unclosed_brace(body, children[own - 1]), "{", "}")
+        return children[:own]
+
+    def unclosed_brace(self, body: Node, last: Node) -> int:
+        """Where the brace stands that is to blame for an unclosed body, whose last child is ``last``: if the '}' of a
+        block in it starts a line further left than the block's own line does, it was meant for the body."""
+        while last.children:
+            last = last.children[-1]
+            if last.type == "block_body" and last.children[-1].type == "}":
+                closer = last.children[-1]
+                if self.indent(closer) == closer.start_point[1] < self.indent(last.children[0]):
+                    return last.start_byte
+        return body.start_byte
+
+    def indent(self, node: Node) -> int:
+        """The number of blanks before the first word of the node's line."""
+        start = node.start_byte - node.start_point[1]
+        line = self.reading.data[start : node.end_byte]
+        return len(line) - len(line.lstrip(b" \t"))
 
     def is_sibling(self, node: Node) -> bool:
         if node.start_point[1] != 0:

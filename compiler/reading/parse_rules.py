@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from . import syntax
+from .mistakes import RULE
 from .parse_values import MAX_DEPTH, Reading, TooDeep, call, expression, name, number, statements
 from .source import Span
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
     from tree_sitter import Node
 
-RULE_EXAMPLE = "a rule looks like Name -> operators operand + …;"
 
 
 class _Piece(NamedTuple):
@@ -33,7 +33,7 @@ class _Piece(NamedTuple):
 
 
 def selection_body(
-    reading: Reading, nodes: list[Node], own_name: str, block: Callable[[Reading, Node, int], syntax.Block]
+    reading: Reading, nodes: list[Node], own_name: str, block: Callable[[Node, int], syntax.Block]
 ) -> tuple[syntax.Term | None, list[syntax.Production]]:
     """Entry action and productions among ``nodes``, children of a ``selection_body``. ``block`` reads a scene block inside a rule."""
     return _Body(reading, own_name, block).read(nodes)
@@ -130,7 +130,7 @@ class _Body:
         if i < len(pieces) and pieces[i].kind != "else":
             return self.production(pieces, i, depth + 1)
         self.reading.complain(self.reading.after(guard.span.end), f"a rule is missing after this '{guard.kind}'",
-                              RULE_EXAMPLE, "missing")
+                              RULE, "missing")
         return None, i
 
     # --- rules
@@ -186,7 +186,7 @@ class _Body:
             target, union_left, end = self.take_last(union)
             if target is None:
                 self.reading.complain(rule.children[0], "nothing stands before this arrow that a rule could be for",
-                                      RULE_EXAMPLE)
+                                      RULE)
                 return union, pieces
             if i == 0:
                 first = union_left
@@ -281,12 +281,14 @@ class _Body:
         return syntax.Term(self.reading.span(node), tuple(items)) if items else None
 
     def complain_stray(self, node: Node) -> None:
-        text = self.reading.text(node)
-        if text[0].isdigit() or text[0] in ".<-":
-            self.reading.complain(node, f"'{text}' can't stand in a rule",
-                                  "an operation with arguments stands in square brackets: [trans 0 0 1] Tree")
+        text, following = self.reading.text(node), node.next_sibling
+        if text == "-" and (following is None or following.type != "stray"):
+            hint = "only '+' joins what a rule produces"
+        elif text[0].isdigit() or text[0] in ".<-":
+            hint = "an operation with arguments stands in square brackets: [trans 0 0 1] Tree"
         else:
-            self.reading.complain(node, f"'{text}' can't stand in a rule", "'+' joins what a rule produces")
+            hint = "'+' joins what a rule produces"
+        self.reading.complain(node, f"'{text}' can't stand in a rule", hint)
 
     def item(self, node: Node, depth: int) -> syntax.Name | syntax.Call | syntax.Inline | syntax.Group | syntax.Block | None:
         reading = self.reading
@@ -295,7 +297,7 @@ class _Body:
         if node.type == "call":
             return call(reading, node, depth)
         if node.type == "block":
-            return self.read_block(reading, node, depth + 1)
+            return self.read_block(node, depth + 1)
         if node.type == "inline":
             reading.need_closer(node, "[", "]")
             return syntax.Inline(reading.span(node), statements(reading, node.children, last_needs_semicolon=False))
@@ -336,10 +338,10 @@ class _Body:
                                   "join several into one: C_a C_b Name;")
             return None
         if not isinstance(first, syntax.Name | syntax.Call):
-            self.reading.complain(union.span, "this is no rule", RULE_EXAMPLE)
+            self.reading.complain(union.span, "this is no rule", RULE)
             return None
         self.reading.complain(self.reading.after(first.span.end), "missing '->' after the rule's name",
-                              RULE_EXAMPLE, "missing")
+                              RULE, "missing")
         rest = items[1:]
         terms = union.terms[1:]
         if rest:

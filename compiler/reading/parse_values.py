@@ -5,7 +5,7 @@ meant. What can't be used at all (a gap that tree-sitter filled in) becomes None
 
 Example::
 
-    reading = Reading(source, diagnostics)
+    reading = Reading(source, clean(source, diagnostics), diagnostics)
     expression(reading, node)       # Binary('*', Name('len'), Number(0.9))
 """
 
@@ -22,26 +22,37 @@ from .source import Source, Span
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-# Recursive readers of the tree (this one and all later stages) stay far below Python's own limit.
-MAX_DEPTH = 200
+# Brackets, operators, blocks and guards nest no deeper, so that this and all later stages, which recurse with up to
+# five frames a level, stay below Python's own limit of 1000.
+MAX_DEPTH = 128
 
 _NUMBER = re.compile(r"\d+(\.\d+)?([eE][+-]?\d+)?")
+_LOOPS = ("for", "while", "do", "return")
 _ESCAPE = re.compile(r"\\(.)")
 _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 
 
-class TooDeep(Exception):
-    """Raised with the offending span; the definition it stands in is left out."""
+class Abandon(Exception):
+    """Raised where nothing more can be made of a definition: it is left out, and this is all that is said of it."""
+
+    def __init__(self, span: Span, message: str, hint: str) -> None:
+        self.span, self.message, self.hint = span, message, hint
+
+
+class TooDeep(Abandon):
+    """Brackets, blocks, operators or guards nested deeper than MAX_DEPTH."""
 
     def __init__(self, span: Span) -> None:
-        self.span = span
+        super().__init__(span, "this is nested too deeply", f"the limit is {MAX_DEPTH} levels")
 
 
 class Reading:
-    """One file being read: its text, what is said about it, and the shorthands that all readers use."""
+    """One file being read: its text (the bytes that were parsed), what is said about it, and the shorthands that all
+    readers use."""
 
-    def __init__(self, source: Source, diagnostics: Diagnostics) -> None:
-        self.source, self.data, self.diagnostics = source, source.data, diagnostics
+    def __init__(self, source: Source, text: bytes, diagnostics: Diagnostics) -> None:
+        self.source, self.data, self.diagnostics = source, text, diagnostics
+        self.foreign_names: set[str] = set()
 
     def span(self, node: Node) -> Span:
         return Span(self.source, node.start_byte, node.end_byte)
@@ -58,8 +69,8 @@ class Reading:
         return Span(self.source, offset, offset)
 
     def need_semicolon(self, node: Node, what: str) -> None:
-        """Complain unless ``node`` ends with ';'."""
-        if node.children[-1].type != ";":
+        """Complain unless ``node`` ends with ';' (perhaps inside of a string or bracket that is never closed)."""
+        if self.data[node.end_byte - 1 : node.end_byte] != b";":
             self.missing_semicolon(node.end_byte, what)
 
     def missing_semicolon(self, offset: int, what: str) -> None:
@@ -94,15 +105,23 @@ def expression(reading: Reading, node: Node | None, depth: int = 0) -> syntax.Ex
 
 def expressions(reading: Reading, nodes: list[Node], depth: int) -> tuple[syntax.Expression, ...]:
     """All of ``nodes`` that are expressions."""
-    found = (expression(reading, node, depth + 1) for node in nodes)
-    return tuple(value for value in found if value is not None)
+    found = []
+    for node in nodes:
+        value = expression(reading, node, depth + 1)
+        if value is not None:
+            found.append(value)
+    return tuple(found)
 
 
 def name(reading: Reading, node: Node | None) -> syntax.Name:
     """The name at ``node``; an empty one where it is missing (which has been reported)."""
     if node is None:
         return syntax.Name(reading.after(0), "")
-    return syntax.Name(reading.span(node), reading.text(node))
+    text = reading.text(node)
+    if not text.isascii() and text not in reading.foreign_names:
+        reading.foreign_names.add(text)
+        reading.complain(node, f"the name '{text}' has letters outside of A to Z", "use the letters A to Z, digits and '_'")
+    return syntax.Name(reading.span(node), text)
 
 
 def _name(reading: Reading, node: Node, depth: int) -> syntax.Name | None:
@@ -177,7 +196,8 @@ def _vector(reading: Reading, node: Node, depth: int) -> syntax.Vector:
         reading.never_closed(node.start_byte, "<", ">")
     components = expressions(reading, node.named_children, depth)
     if not 2 <= len(components) <= 5 and not node.has_error:
-        reading.complain(node, f"a vector has 2 to 5 components, this one has {len(components)}", "write <x, y, z>")
+        reading.complain(node, f"a vector has 2 to 5 components, this one has {len(components)}",
+                         "write <x, y, z>; a comparison in it stands in brackets")
     return syntax.Vector(reading.span(node), components)
 
 
@@ -290,6 +310,9 @@ def _split_lines(reading: Reading, parts: list[Node]) -> list[tuple[int, int]]:
 
 
 def _one_operation(reading: Reading, parts: list[Node]) -> syntax.Operation:
+    if reading.text(parts[0]) in _LOOPS:
+        hint = "a Selection repeats: Selection Row { if (n > 0) Row -> C_count Row; }"
+        raise Abandon(reading.span(parts[0]), f"'{reading.text(parts[0])}' is no statement", hint)
     commas = [part for part in parts if part.type == ","]
     arguments = expressions(reading, [part for part in parts[1:] if part.type != ","], 0)
     # With commas, arguments and commas take turns.
