@@ -1,0 +1,30 @@
+"""Merge adjacent constant transformations into one matrix.
+
+before ::                                    after ::
+
+    0 transform A <2 0 0 0 …> -> 1               0 transform A*B <2 0 0 6 …> -> 2
+    1 transform B <1 0 0 3 …> -> 2               2 primitive sphere
+    2 primitive sphere
+
+Singular ones stay apart: rounding could make the product of one look regular. So do products that overflow or
+underflow to a singular matrix.
+"""
+
+from __future__ import annotations
+
+from .. import graph as g
+from ..matrices import is_finite, is_singular, multiply
+
+
+def merge(graph: g.Graph) -> None:
+    for node in graph.nodes:
+        if not isinstance(node, g.Transform) or is_singular(node.matrix):
+            continue
+        while isinstance(inner := graph.nodes[node.child], g.Transform) and not is_singular(inner.matrix):
+            product = tuple(value + 0.0 for value in multiply(node.matrix, inner.matrix))
+            if not is_finite(product) or is_singular(product):
+                break
+            shown = [name or "[]" for name in (node.name, inner.name)]
+            graph.left_out.append(g.LeftOut(f"transformation {shown[1]}", f"merged into {shown[0]} before it"))
+            node.name = "*".join(name for name in (node.name, inner.name) if name)
+            node.matrix, node.child = product, inner.child

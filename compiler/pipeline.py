@@ -1,0 +1,94 @@
+"""The way from a scene's text to bytecode, with all that lies between: read → parse → resolve → check → lower →
+passes → encode.
+
+Example::
+
+    compilation = build("scenes/tree.plsys", parameters={"order": 12})
+    print(compilation.graph)
+    data = compilation.encode()
+"""
+
+from __future__ import annotations
+
+import sys
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Iterator, Mapping
+
+from .graph.graph import Graph, LeftOut
+from .reading.diagnostics import Diagnostic, Diagnostics, PlsysError, SceneError
+from .reading.model import Model
+from .reading.source import Source
+
+# Nested Python calls while compiling; an expression nested deeper than some thousands isn't a scene.
+RECURSION_LIMIT = 20_000
+
+
+@dataclass
+class Compilation:
+    """A scene that has no errors. ``diagnostics`` holds its warnings and infos in file order."""
+
+    source: Source
+    model: Model
+    graph: Graph
+    diagnostics: list[Diagnostic]
+
+    @property
+    def left_out(self) -> list[LeftOut]:
+        """What the passes removed because the scene doesn't need it."""
+        return self.graph.left_out
+
+    def encode(self, sourcemap: bool = True) -> bytes:
+        """The bytecode. PlsysError if the scene exceeds a limit of the format."""
+        from .bytecode.encode import encode
+
+        with deep_nesting(self.source.name):
+            return encode(self.graph, sourcemap)
+
+
+def build(
+    scene: str | Path | Source, parameters: Mapping[str, float] | None = None, seed: float | None = None
+) -> Compilation:
+    """Compile a file (a path, or a Source) as far as the graph after all passes.
+
+    ``parameters`` sets the scene's ``Parameter`` inputs, ``seed`` replaces global_settings' seed. Raises SceneError
+    with every diagnostic of a scene that has errors, PlsysError for a file that can't be read."""
+    source = read(scene)
+    with deep_nesting(source.name):
+        diagnostics = Diagnostics()
+        model = read_model(source, diagnostics, parameters or {}, seed)
+        if model is None or diagnostics.has_errors:
+            raise SceneError(diagnostics.sorted())
+        graph = build_graph(model)
+    return Compilation(source, model, graph, diagnostics.sorted())
+
+
+def read(scene: str | Path | Source) -> Source:
+    if isinstance(scene, Source):
+        return scene
+    try:
+        return Source.read(scene)
+    except (OSError, ValueError) as error:
+        raise PlsysError(f"can't be read: {getattr(error, 'strerror', None) or error}", str(scene)) from None
+
+
+def build_graph(model: Model) -> Graph:
+    """The graph of a model without errors, after all passes."""
+    from .graph.lower import lower
+    from .graph.passes import run_passes
+
+    return run_passes(lower(model))
+
+
+@contextmanager
+def deep_nesting(place: str) -> Iterator[None]:
+    """Room for deeply nested expressions; what exceeds even that is one clear error."""
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(before, RECURSION_LIMIT))
+    try:
+        yield
+    except RecursionError:
+        raise PlsysError("an expression is nested too deeply", place) from None
+    finally:
+        sys.setrecursionlimit(before)
