@@ -111,9 +111,9 @@ def _apply(
     if operation in ("and", "or", "select"):
         return _short_circuit(operation, arguments, scope, rows)
     values = [evaluate(argument, scope, rows) for argument in arguments]
+    if operation in ("rand", "hash") and not all(np.isfinite(v).all() for v in values):
+        raise PlsysError(f"an argument of {operation} is not a finite number", place(expression))
     if operation == "rand":
-        if not np.isfinite(values[0]).all():
-            raise PlsysError("rand's stream must be a finite number", place(expression))
         return draw(scope, rows, elementary.bits(values[0]), expression)
     if operation == "hash":
         return elementary.hash(scope.seed_key, *values)

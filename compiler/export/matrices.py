@@ -81,6 +81,9 @@ def rotation(degrees: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray) -
     """Rodrigues' rotation about the axis (x, y, z); NaN where the axis is zero."""
     sine, cosine = elementary.sin(degrees), elementary.cos(degrees)
     with np.errstate(all="ignore"):
+        # By the largest component first, so that no square over- or underflows.
+        largest = np.maximum(np.abs(x), np.maximum(np.abs(y), np.abs(z)))
+        x, y, z = x / largest, y / largest, z / largest
         length = np.sqrt(x * x + y * y + z * z)
         x, y, z = x / length, y / length, z / length
     rest = 1 - cosine

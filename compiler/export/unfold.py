@@ -237,7 +237,10 @@ class _Derivation:
                     return
                 case g.Branch():
                     scope = self._scope(at)
-                    taken = evaluate(node.test, scope) != 0
+                    test = evaluate(node.test, scope)
+                    if not np.isfinite(test).all():
+                        raise PlsysError("a condition is not a finite number", place(node.test) or place(node))
+                    taken = test != 0
                     at = at.but(draws=scope.draws)
                     self._walk(node.then, at.take(taken))
                     index, at = node.otherwise, at.take(~taken)
