@@ -253,6 +253,19 @@ class Input:
     span: Span
 
 
+@dataclass(eq=False)
+class Definition:
+    """A name of the scene, for messages and editors: ``kind`` is selection, calculation, transformation, texture,
+    pigment, finish, color_map, object, value, input or parameter; ``span`` its (first) defining occurrence,
+    ``assignments`` where a parameter is assigned, ``references`` where the name is used."""
+
+    name: str
+    kind: str
+    span: Span
+    assignments: list[Span] = field(default_factory=list)
+    references: list[Span] = field(default_factory=list)
+
+
 @dataclass
 class Model:
     source: Source
@@ -265,3 +278,4 @@ class Model:
     parameters: list[str] = field(default_factory=list)  # assigned names, in order of first appearance
     meshes: list[Mesh] = field(default_factory=list)
     inputs: list[Input] = field(default_factory=list)
+    definitions: dict[str, Definition] = field(default_factory=dict)

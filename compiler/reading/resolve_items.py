@@ -1,0 +1,200 @@
+"""The items of a scene block, read from left to right.
+
+POV-Ray's blocks are flat: ``location <0, 1, 2> angle 45`` is a name, a vector, a name, a number. An
+:class:`Items` cursor takes them apart by what each property wants, as the vocabulary says.
+
+Example::
+
+    items = Items(block, expressions, BLOCKS)
+    items.vector("the centre"), items.number("the radius")
+    items.colour()                 # color rgb <1, 0, 0> transmit 0.5
+"""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+from . import syntax, vocabulary
+from .diagnostics import Diagnostics, nearest
+from .model import Constant, Expression
+from .resolve_expressions import Expressions, Scope, Value
+from .resolve_names import Problem, unsupported
+from .source import Span
+from .vocabulary import Row
+
+RGB_PARTS = {"rgb": (0, 1, 2), "rgbf": (0, 1, 2, 3), "rgbt": (0, 1, 2, 4), "rgbft": (0, 1, 2, 3, 4)}
+WORD_PARTS = {"red": 0, "green": 1, "blue": 2, "filter": 3, "transmit": 4}
+
+
+class Items:
+    """A cursor over ``items``; ``end`` is the span to blame for what is missing."""
+
+    def __init__(
+        self, what: str, span: Span, items: Sequence[syntax.Item], expressions: Expressions, scope: Scope
+    ) -> None:
+        self.what, self.span, self.items = what, span, items
+        self.expressions, self.scope, self.at = expressions, scope, 0
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        return self.expressions.names.diagnostics
+
+    def __bool__(self) -> bool:
+        return self.at < len(self.items)
+
+    def peek(self) -> syntax.Item | None:
+        return self.items[self.at] if self else None
+
+    def take(self) -> syntax.Item:
+        item = self.items[self.at]
+        self.at += 1
+        return item
+
+    def word(self) -> str:
+        """The name that comes next, of a word or of a block, or ''."""
+        item = self.peek()
+        if isinstance(item, syntax.Name):
+            return item.name
+        return item.name.name if isinstance(item, syntax.Block | syntax.Call) else ""
+
+    def plain_word(self) -> str:
+        """The name that comes next, unless it is a block's or a call's."""
+        item = self.peek()
+        return item.name if isinstance(item, syntax.Name) else ""
+
+    def skip_value(self) -> None:
+        """After an error: go on to the next item that can begin a property."""
+        while self and not isinstance(self.peek(), syntax.Name | syntax.Block):
+            self.at += 1
+
+    # --- values
+
+    def value(self, needed: str) -> Value:
+        item = self.peek()
+        if item is None or isinstance(item, syntax.Block | syntax.MapEntry):
+            span = item.span if item is not None else Span(self.span.source, self.span.end, self.span.end)
+            raise Problem("wrong-arguments", span, f"{self.what} needs {needed} here")
+        return self.expressions.value(self.take(), self.scope)  # type: ignore[arg-type]
+
+    def number(self, needed: str = "a number") -> Expression:
+        value = self.value(needed)
+        if value.kind != "number":
+            raise Problem("wrong-value", value.span, f"{needed} must be a number, this is {value.described}")
+        return value.parts[0]
+
+    def constant(self, needed: str = "a number", row: Row | None = None) -> float:
+        number = self.number(needed)
+        if not isinstance(number, Constant):
+            raise Problem("wrong-kind", self.items[self.at - 1].span, f"{needed} must be constant")
+        if row is not None:
+            check_range(row, number.value, self.items[self.at - 1].span)
+        return number.value
+
+    def vector(self, needed: str = "a vector", size: int = 3) -> tuple[float, ...]:
+        """A constant vector; a number stands for a vector of itself, as in POV-Ray."""
+        value = self.value(needed)
+        if value.kind == "number":
+            value = Value("vector", value.parts * size, value.span)
+        if len(value.parts) != size or value.kind != "vector":
+            raise Problem("wrong-value", value.span, f"{needed} must be a vector of {size}, this is {value.described}")
+        if not all(isinstance(part, Constant) for part in value.parts):
+            raise Problem("wrong-kind", value.span, f"{needed} must be constant")
+        return value.numbers()
+
+    # --- colours
+
+    def starts_colour(self) -> bool:
+        """Whether a colour word, a colour's name or a value comes next."""
+        item = self.peek()
+        if isinstance(item, syntax.Name):
+            name = item.name
+            if name in vocabulary.COLOUR_WORDS or name in vocabulary.COLOURS:
+                return True
+            entry = self.expressions.names.entries.get(name)
+            return entry is not None and entry.kind in ("value", "input", "parameter")
+        return item is not None and not isinstance(item, syntax.Block | syntax.MapEntry | syntax.String)
+
+    def colour(self, needed: str = "a colour") -> Value:
+        """``color rgb <1, 0, 0>``, ``Red transmit 0.5``, ``red 1 green 0.5``, ``<1, 0, 0>``: five parts."""
+        item = self.peek()
+        begin = self.at
+        if self.plain_word() in ("color", "colour"):
+            self.take()
+        word = self.plain_word()
+        if word in RGB_PARTS:
+            self.take()
+            parts = self._rgb(word)
+        elif word in WORD_PARTS:
+            parts = [Constant(0.0)] * 5
+        else:
+            parts = self._plain(needed)
+        while self.plain_word() in WORD_PARTS:
+            word = self.plain_word()
+            self.take()
+            parts[WORD_PARTS[word]] = self.number(f"'{word}'")
+        first = self.items[begin] if item is not None else self
+        span = first.span.to(self.items[self.at - 1].span)
+        self._look_for_bytes(parts, span)
+        return Value("colour", tuple(parts), span)
+
+    def _rgb(self, word: str) -> list[Expression]:
+        indices = RGB_PARTS[word]
+        value = self.value(f"{word}'s components")
+        given = value.parts
+        if value.kind == "number":
+            given = given * len(indices)
+        elif value.kind == "colour":
+            given = tuple(given[i] for i in indices)
+        if len(given) != len(indices):
+            row = vocabulary.COLOUR_WORDS[word]
+            message = f"{word} takes {len(indices)} components, this is {value.described}"
+            raise Problem("wrong-value", value.span, message, f"write {row.signature}")
+        parts: list[Expression] = [Constant(0.0)] * 5
+        for i, part in zip(indices, given):
+            parts[i] = part
+        return parts
+
+    def _plain(self, needed: str) -> list[Expression]:
+        """A colour without ``rgb``: missing components are 0, a number stands for all five (POV-Ray)."""
+        value = self.value(needed)
+        if value.kind == "number":
+            return list(value.parts * 5)
+        if not 3 <= len(value.parts) <= 5:
+            raise Problem("wrong-value", value.span, f"{needed} must be a colour, this is {value.described}")
+        return [*value.parts, Constant(0.0), Constant(0.0)][:5]
+
+    def _look_for_bytes(self, parts: Sequence[Expression], span: Span) -> None:
+        shown = [part.value for part in parts[:3] if isinstance(part, Constant)]
+        if any(value > 20 for value in shown) and all(value == int(value) and 0 <= value <= 255 for value in shown):
+            hint = f"perhaps rgb <{', '.join(f'{value:g}/255' for value in shown)}>"
+            self.diagnostics.add("colour-range", span, "a colour's components are from 0 to 1", hint)
+
+    # --- what doesn't belong
+
+    def misfit(self, rows: Sequence[str]) -> Problem:
+        """What to say of the next item, which the block has no use for; moves past it."""
+        item = self.take()
+        name = item.name if isinstance(item, syntax.Block | syntax.Call) else item
+        if not isinstance(name, syntax.Name):
+            self.skip_value()
+            return Problem("wrong-value", item.span, f"{self.what} has no use for this")
+        self.skip_value()
+        if not name.name:
+            return Problem()
+        if name.name in vocabulary.UNSUPPORTED:
+            return unsupported(name)
+        message = f"{self.what} has no '{name.name}'"
+        hint = nearest(name.name, rows)
+        if not hint and rows:
+            hint = f"it has: {' '.join(rows)}"
+        code = "wrong-kind" if vocabulary.kind_of(name.name) or name.name in self.expressions.names.entries else "unknown-name"
+        return Problem(code, name.span, message, hint)
+
+
+def check_range(row: Row, value: float, span: Span) -> None:
+    """Raises Problem unless ``value`` is in the row's range."""
+    if row.type == "integer" and value != int(value):
+        raise Problem("wrong-value", span, f"{row.name} must be a whole number, not {value:g}")
+    if row.range is not None and value not in row.range:
+        unit = f" {row.unit}" if row.unit == "degrees" else ""
+        raise Problem("wrong-value", span, f"{row.name} must be {row.range}{unit}, not {value:g}")

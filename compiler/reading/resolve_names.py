@@ -1,0 +1,283 @@
+"""The names of a scene: every definition of all its files in one namespace.
+
+syntax.File → :class:`Names`: includes followed, names that clash reported, parameters (the names that something
+assigns) found. What a name's value is, the other resolve modules work out.
+
+Example::
+
+    names = Names(diagnostics, Source.read)
+    names.gather(file)
+    names.find(name, ("calculation", "transformation"), "an operator").kind
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Callable, Iterable, Iterator
+
+from . import syntax, vocabulary
+from .diagnostics import Diagnostics, Note, nearest
+from .model import Definition
+from .source import Source, Span
+
+ARTICLES = {
+    "selection": "a Selection",
+    "calculation": "a Calculation",
+    "transformation": "a Transformation",
+    "texture": "a texture",
+    "pigment": "a pigment",
+    "finish": "a finish",
+    "color_map": "a color_map",
+    "object": "a declared object",
+    "value": "a constant",
+    "input": "a Parameter (an input of the scene)",
+    "parameter": "a parameter that a Calculation assigns",
+    "keyword": "a reserved word",
+    "modifier": "a modifier",
+    "block": "a scene block",
+    "operation": "an operation",
+    "constant": "a constant",
+    "function": "a function",
+    "primitive": "a primitive",
+    "colour": "a colour",
+}
+
+OBJECT_BLOCKS = (
+    "object union sphere box cylinder cone plane torus triangle smooth_triangle disc mesh".split()
+)  # fmt: skip
+
+
+class Problem(Exception):
+    """Ends the resolution of one construct. Without a code it has been reported already."""
+
+    def __init__(
+        self, code: str = "", span: Span | None = None, message: str = "", hint: str = "", notes: Iterable[Note] = ()
+    ) -> None:
+        super().__init__(message)
+        self.code, self.span, self.message, self.hint, self.notes = code, span, message, hint, tuple(notes)
+
+    def report(self, diagnostics: Diagnostics) -> None:
+        if self.code:
+            assert self.span is not None
+            diagnostics.add(self.code, self.span, self.message, self.hint, self.notes)
+
+
+@dataclass
+class Entry:
+    """A name of the namespace. ``node`` is its definition's syntax tree; ``value`` is what a resolve module has
+    made of it, while ``busy`` says that it is being made (so that a cycle is found)."""
+
+    definition: Definition
+    node: object
+    value: object = None
+    busy: bool = False
+    failed: bool = False
+
+    @property
+    def kind(self) -> str:
+        return self.definition.kind
+
+
+@dataclass
+class Names:
+    """The namespace. ``blocks`` are the scene blocks of all files in order, ``files`` the files read."""
+
+    diagnostics: Diagnostics
+    loader: Callable[[Path], Source]
+    entries: dict[str, Entry] = field(default_factory=dict)
+    blocks: list[syntax.Block] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+    _open: list[tuple[Path, Span]] = field(default_factory=list)
+
+    # --- gathering
+
+    def gather(self, file: syntax.File) -> None:
+        """Add all definitions of ``file`` and of what it includes; assigned names come last, so that a
+        definition of the same name is what the message calls the first."""
+        definitions = list(self._expand(file))
+        for node in definitions:
+            if isinstance(node, syntax.Block):
+                self.blocks.append(node)
+            else:
+                self._define(node)
+        for node in definitions:
+            for name in assigned_names(node):
+                self._assign(name)
+
+    def _expand(self, file: syntax.File) -> Iterator[syntax.Definition]:
+        path = file.span.source.path
+        if path is not None:
+            self.files.append(path)
+        self._open.append((_identity(path), file.span))
+        for node in file.definitions:
+            if isinstance(node, syntax.Include):
+                included = self._include(node)
+                if included is not None:
+                    yield from self._expand(included)
+            else:
+                yield node
+        self._open.pop()
+
+    def _include(self, node: syntax.Include) -> syntax.File | None:
+        """The file that ``node`` names, parsed; None when it has been read already or can't be."""
+        from .parse import parse
+
+        written, span = node.path.value, node.path.span
+        if written.lower().endswith(".inc"):
+            stem = Path(written).stem.lower()
+            stock = vocabulary.STOCK_INCLUDES
+            known = stem in stock["names"]
+            message = f"'{written}' is {'one of POV-Ray' + chr(39) + 's stock files' if known else 'a POV-Ray file'}, which plsys doesn't read"
+            self.diagnostics.add("include", span, message, str(stock["colors" if stem == "colors" else "default"]))
+            return None
+        base = span.source.path
+        path = (base.parent if base is not None else Path()) / written
+        if any(_identity(path) == other for other, _ in self._open):
+            chain = " → ".join([*(other.name for other, _ in self._open), path.name])
+            self.diagnostics.add("include", span, f"'{written}' includes itself", f"the chain is {chain}")
+            return None
+        if any(_identity(path) == _identity(other) for other in self.files):
+            return None
+        try:
+            source = self.loader(path)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            message = f"can't read '{written}': {reason}"
+            self.diagnostics.add("include", span, message, f"looked for {path}, relative to the file that includes it")
+            return None
+        file, found = parse(source)
+        self.diagnostics.items += found.items
+        return file
+
+    def _define(self, node: syntax.Definition) -> None:
+        name: syntax.Name = node.name
+        if not name.name:
+            return
+        if taken := vocabulary.kind_of(name.name):
+            hint = "choose another name; the vocabulary's can't be given new meanings"
+            self.diagnostics.add("duplicate-name", name.span, f"'{name.name}' is {ARTICLES[taken]} of plsys", hint)
+            return
+        if (first := self.entries.get(name.name)) is not None:
+            note = Note(first.definition.span, f"'{name.name}' is first defined here")
+            hint = "names of all kinds share one namespace"
+            self.diagnostics.add("duplicate-name", name.span, f"'{name.name}' is defined twice", hint, (note,))
+            return
+        self.entries[name.name] = Entry(Definition(name.name, _kind(node), name.span), node)
+
+    def _assign(self, name: syntax.Name) -> None:
+        if not name.name:
+            return
+        entry = self.entries.get(name.name)
+        if entry is not None and entry.kind == "parameter":
+            entry.definition.assignments.append(name.span)
+            return
+        taken = vocabulary.kind_of(name.name)
+        if taken or entry is not None:
+            what = f"{ARTICLES[taken]} of plsys" if taken else ARTICLES[entry.kind]
+            notes = () if taken else (Note(entry.definition.span, f"'{name.name}' is defined here"),)
+            message = f"'{name.name}' is {what} and can't be assigned"
+            self.diagnostics.add("wrong-kind", name.span, message, "choose another name for the parameter", notes)
+            return
+        definition = Definition(name.name, "parameter", name.span, assignments=[name.span])
+        self.entries[name.name] = Entry(definition, name)
+
+    # --- looking up
+
+    def find(self, name: syntax.Name, kinds: tuple[str, ...], wanted: str) -> Entry:
+        """The entry of ``name``, which must be of one of ``kinds``; ``wanted`` says that in words. Records the
+        reference. Raises Problem."""
+        if not name.name:
+            raise Problem
+        entry = self.entries.get(name.name)
+        if entry is None:
+            raise self.unknown(name, kinds, wanted)
+        entry.definition.references.append(name.span)
+        if entry.kind not in kinds:
+            note = Note(entry.definition.span, f"'{name.name}' is defined here")
+            message = f"'{name.name}' is {ARTICLES[entry.kind]}, not {wanted}"
+            raise Problem("wrong-kind", name.span, message, self._suggest(name, kinds), (note,))
+        return entry
+
+    def unknown(self, name: syntax.Name, kinds: tuple[str, ...], wanted: str) -> Problem:
+        """What to say of a name that no definition of the scene has."""
+        if taken := vocabulary.kind_of(name.name):
+            message = f"'{name.name}' is {ARTICLES[taken]}, not {wanted}"
+            return Problem("wrong-kind", name.span, message, self._suggest(name, kinds))
+        if name.name in vocabulary.UNSUPPORTED:
+            return unsupported(name)
+        hint = self._suggest(name, kinds) or nearest(name.name, self.entries)
+        return Problem("unknown-name", name.span, f"unknown name '{name.name}': {wanted} is needed here", hint)
+
+    def _suggest(self, name: syntax.Name, kinds: tuple[str, ...]) -> str:
+        rows = {"primitive": vocabulary.PRIMITIVES, "function": vocabulary.FUNCTIONS, "constant": vocabulary.CONSTANTS}
+        names = [other for other, entry in self.entries.items() if entry.kind in kinds]
+        names += [other for kind in kinds for other in rows.get(kind, ())]
+        if "colour" in kinds:
+            names += vocabulary.COLOURS
+        return nearest(name.name, [other for other in names if other != name.name])
+
+
+def unsupported(name: syntax.Name) -> Problem:
+    """What to say of a POV-Ray feature that plsys doesn't have."""
+    hint = vocabulary.UNSUPPORTED[name.name]
+    return Problem("unsupported", name.span, f"POV-Ray's '{name.name}' isn't supported", hint)
+
+
+def assigned_names(node: syntax.Definition) -> Iterator[syntax.Name]:
+    """The parameters that ``node`` assigns, in text order."""
+    if isinstance(node, syntax.Calculation | syntax.Inline):
+        yield from (each.target for each in node.statements if isinstance(each, syntax.Assignment))
+    elif isinstance(node, syntax.Selection):
+        yield from node.parameters
+        for term in terms_of(node):
+            for item in term.items:
+                if isinstance(item, syntax.Inline):
+                    yield from assigned_names(item)
+
+
+def terms_of(node: syntax.Selection) -> Iterator[syntax.Term]:
+    """Every term of a Selection's productions and entry action, those in brackets included."""
+    if node.entry is not None:
+        yield node.entry
+    for production in node.productions:
+        yield from _production_terms(production)
+
+
+def _production_terms(production: syntax.Production | None) -> Iterator[syntax.Term]:
+    while isinstance(production, syntax.If):
+        yield from _production_terms(production.then)
+        production = production.otherwise
+    if production is not None:
+        for alternative in production.alternatives:
+            if alternative.body is not None:
+                yield from _union_terms(alternative.body)
+
+
+def _union_terms(union: syntax.Union) -> Iterator[syntax.Term]:
+    for term in union.terms:
+        yield term
+        for item in term.items:
+            if isinstance(item, syntax.Group):
+                yield from _union_terms(item.union)
+
+
+def _kind(node: syntax.Definition) -> str:
+    if isinstance(node, syntax.Declare):
+        first = node.items[0] if node.items else None
+        if not isinstance(first, syntax.Block):
+            return "value"
+        if first.name.name == "colour_map":
+            return "color_map"
+        return first.name.name if first.name.name in ("texture", "pigment", "finish", "color_map") else "object"
+    return {
+        syntax.ParameterDeclaration: "input",
+        syntax.Selection: "selection",
+        syntax.Calculation: "calculation",
+        syntax.Transformation: "transformation",
+        syntax.Texture: "texture",
+    }[type(node)]
+
+
+def _identity(path: Path | None) -> Path:
+    return path.resolve() if path is not None else Path("<text>")

@@ -1,0 +1,146 @@
+"""Calculations and Transformations: statements → operators.
+
+Example: ``{ --cntTree; betaBr -= 4.0; }`` becomes one Calculate with two Assigns;
+``[ --n; trans 0 0 1 ]`` becomes a Calculate and a Transform.
+"""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+from . import syntax, vocabulary
+from .model import Apply, Assign, Calculate, Constant, Expression, Operator, Read, Step, Transform, Variants
+from .resolve_expressions import RULES, Expressions
+from .resolve_names import ARTICLES, Entry, Names, Problem
+from .source import Span
+
+UPDATES = {"+=": "add", "-=": "subtract", "*=": "multiply", "/=": "divide", "++": "add", "--": "subtract"}
+
+# What POV-Ray calls the operations, for the hint.
+POV_NAMES = {"translate": "trans", "rotate": "rotx, roty and rotz", "move": "trans", "turn": "rotz", "rotate_z": "rotz"}
+
+
+class Operators:
+    def __init__(self, names: Names, expressions: Expressions) -> None:
+        self.names, self.expressions = names, expressions
+
+    def declared(self, entry: Entry) -> Operator:
+        """The operator that a Calculation or Transformation is; made once. Problems of single statements are
+        reported here, and the statements left out."""
+        if entry.value is None:
+            node = entry.node
+            assert isinstance(node, syntax.Calculation | syntax.Transformation)
+            entry.value = self._definition(node)
+        return entry.value  # type: ignore[return-value]
+
+    def _definition(self, node: syntax.Calculation | syntax.Transformation) -> Operator:
+        calculates = isinstance(node, syntax.Calculation)
+        made = []
+        for statement in node.statements:
+            try:
+                result = self._statement(statement)
+                if isinstance(result, Step) == calculates:
+                    raise self._misplaced(statement, calculates, node.name.name)
+                made.append(result)
+            except Problem as problem:
+                problem.report(self.names.diagnostics)
+        if calculates:
+            return Calculate(node.name.name, tuple(made), span=node.name.span)
+        return Transform(node.name.name, tuple(made), node.name.span)
+
+    def inline(self, node: syntax.Inline) -> list[Operator]:
+        """Each line is an operator; lines of one kind that follow each other make one."""
+        operators: list[Operator] = []
+        for statement in node.statements:
+            result = self._statement(statement)
+            last = operators[-1] if operators else None
+            if isinstance(result, Step):
+                if isinstance(last, Transform):
+                    operators[-1] = Transform("", (*last.steps, result), last.span)
+                else:
+                    operators.append(Transform("", (result,), node.span))
+            elif isinstance(last, Calculate):
+                operators[-1] = Calculate("", (*last.statements, result), span=last.span)
+            else:
+                operators.append(Calculate("", (result,), span=node.span))
+        return operators
+
+    # --- statements
+
+    def _statement(self, node: syntax.Statement) -> Assign | Variants | Step:
+        if isinstance(node, syntax.Assignment):
+            return self._assignment(node)
+        row = vocabulary.OPERATIONS.get(node.name.name)
+        if row is None:
+            raise self._unknown(node.name)
+        if row.name == "variants":
+            return self._variants(node)
+        arguments = []
+        for argument in node.arguments:
+            if isinstance(argument, syntax.Vector):
+                hint = f"{row.name}'s numbers stand side by side: {row.signature}"
+                raise Problem("wrong-arguments", argument.span, f"{row.name} takes numbers, not a vector", hint)
+            arguments.append(self.expressions.number(argument, RULES))
+        self._count(row, node)
+        uniform = row.name == "scale" and len(arguments) == 1
+        return Step("scale_uniform" if uniform else row.name, tuple(arguments), node.span)
+
+    def _assignment(self, node: syntax.Assignment) -> Assign:
+        name = node.target.name
+        entry = self.names.entries.get(name)
+        if entry is None or entry.kind != "parameter":
+            raise Problem  # reported where the assigned names were gathered
+        if node.value is None:
+            value: Expression = Constant(1.0, node.span)
+        else:
+            value = self.expressions.number(node.value, RULES)
+        if node.operator != "=":
+            entry.definition.references.append(node.target.span)
+            value = Apply(UPDATES[node.operator], (Read(name, node.target.span), value), node.span)
+        return Assign(name, value, node.span)
+
+    def _variants(self, node: syntax.Operation) -> Variants:
+        row = vocabulary.OPERATIONS["variants"]
+        arguments = [self.expressions.number(argument, RULES) for argument in node.arguments]
+        self._count(row, node)
+        count = arguments[0]
+        if isinstance(count, Constant) and (count.value not in row.range or count.value != int(count.value)):
+            message = f"the number of variants is a whole number from 1 to 4294967296, not {count.value:g}"
+            raise Problem("wrong-value", node.arguments[0].span, message)
+        return Variants(count, node.span)
+
+    def _count(self, row: vocabulary.Row, node: syntax.Operation) -> None:
+        if not row.accepts(len(node.arguments)):
+            message = f"{row.name} takes {row.expected}, not {len(node.arguments)}"
+            hint = f"write {row.signature}"
+            if len(node.arguments) > max(row.arity):
+                hint += "; perhaps a ';' is missing"
+            raise Problem("wrong-arguments", node.span, message, hint)
+
+    def _misplaced(self, node: syntax.Statement, calculates: bool, name: str) -> Problem:
+        if calculates:
+            assert isinstance(node, syntax.Operation)
+            message = f"'{node.name.name}' moves the frame, which the Calculation {name} can't"
+            return Problem("wrong-kind", node.span, message, "put it into a Transformation")
+        message = f"the Transformation {name} can't calculate"
+        return Problem("wrong-kind", node.span, message, "put this into a Calculation")
+
+    def _unknown(self, name: syntax.Name) -> Problem:
+        if name.name in POV_NAMES:
+            hint = f"in a Transformation it is {POV_NAMES[name.name]}, with the numbers side by side"
+            return Problem("unknown-name", name.span, f"'{name.name}' is POV-Ray's modifier of scene objects", hint)
+        if (entry := self.names.entries.get(name.name)) is not None:
+            message = f"'{name.name}' is {ARTICLES[entry.kind]}, not an operation"
+            hint = f"to assign it, write {name.name} = …" if entry.kind == "parameter" else ""
+            return Problem("wrong-kind", name.span, message, hint)
+        from .diagnostics import nearest
+
+        problem = self.names.unknown(name, (), "an operation")
+        problem.hint = problem.hint or nearest(name.name, vocabulary.OPERATIONS)
+        problem.hint = problem.hint or f"operations are {' '.join(vocabulary.OPERATIONS)}"
+        return problem
+
+
+def check_span(nodes: Sequence[syntax.Node]) -> Span:
+    """The span of nodes that stand side by side."""
+    return nodes[0].span.to(nodes[-1].span)
