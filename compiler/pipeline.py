@@ -56,12 +56,26 @@ def build(
     with every diagnostic of a scene that has errors, PlsysError for a file that can't be read."""
     source = read(scene)
     with deep_nesting(source.name):
-        diagnostics = Diagnostics()
-        model = read_model(source, diagnostics, parameters or {}, seed)
-        if model is None or diagnostics.has_errors:
+        model, diagnostics = build_model(source, parameters, seed)
+        if diagnostics.has_errors:
             raise SceneError(diagnostics.sorted())
         graph = build_graph(model)
     return Compilation(source, model, graph, diagnostics.sorted())
+
+
+def build_model(
+    source: Source, parameters: Mapping[str, float] | None = None, seed: float | None = None
+) -> tuple[Model, Diagnostics]:
+    """The model of what could be understood of a scene, and every message about it."""
+    from .reading.check import check
+    from .reading.parse import parse
+    from .reading.resolve import resolve
+
+    file, diagnostics = parse(source)
+    model = resolve(file, diagnostics, parameters=dict(parameters or {}), seed=seed)
+    if not diagnostics.has_errors:
+        check(model, diagnostics)
+    return model, diagnostics
 
 
 def read(scene: str | Path | Source) -> Source:

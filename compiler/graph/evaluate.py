@@ -17,11 +17,11 @@ from dataclasses import dataclass, field
 from typing import Callable, Sequence
 
 from .. import elementary
+from ..elementary import CHOICE_STREAM, bits, mix, name_hash
 from ..reading.model import Apply, Assign, Constant, Expression, Read
 from ..reading.source import Span
 from . import graph as g
 from .matrices import Matrix, is_finite, matrix_of
-from .random import CHOICE_STREAM, TERM, bits, hash_of, mix, name_hash, unit
 
 DRAWS_PER_APPLICATION = 64
 MAX_VARIANTS = 2**32
@@ -58,7 +58,7 @@ class Scope:
     def term(self, i: int) -> Scope:
         """The scope of term i of a union."""
         scope = self.copy()
-        scope.key = mix(self.key, TERM + i)
+        scope.key = elementary.term_key(self.key, i)
         return scope
 
     def draw(self, stream: int, span: Span | None = None) -> float:
@@ -67,7 +67,7 @@ class Scope:
         if sum(self.drawn.values()) >= DRAWS_PER_APPLICATION:
             raise EvaluationError("limit", f"more than {DRAWS_PER_APPLICATION} draws in one application", span)
         self.drawn[stream] = ordinal + 1
-        return unit(mix(mix(self.key, stream), ordinal))
+        return elementary.rand(self.key, stream, ordinal)
 
 
 def _divide(a: float, b: float) -> float:
@@ -127,7 +127,7 @@ def evaluate(expression: Expression, scope: Scope) -> float:
     if operation == "hash":
         for value in values:
             _require_finite("an argument of hash", value, expression)
-        return hash_of(scope.seed_key, values)
+        return elementary.hash(scope.seed_key, *values)
     return apply(operation, values)
 
 

@@ -155,7 +155,7 @@ def _is_legal_part(part: Expression) -> bool:
     if isinstance(part, Apply):
         count = len(part.arguments)
         return 1 <= count <= HASH_ARGUMENTS if part.operation == "hash" else ARGUMENTS.get(part.operation) == count
-    return isinstance(part, Read) or (isinstance(part, Constant) and isinstance(part.value, float))
+    return isinstance(part, Read) or (isinstance(part, Constant) and isinstance(part.value, (int, float)))
 
 
 def _is_legal_step(step: Step) -> bool:
