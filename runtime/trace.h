@@ -61,6 +61,11 @@ bool pl_trace_all(pl_tracer *tracer, const pl_ray *ray, bool (*visit)(void *cont
 
 bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface, pl_error *error);
 
+/* A t_min that is safe for rays of unit-length direction that start at a surface found at t on a ray: some ulps of the
+ * largest coordinate that the hit was computed from, a level of the path. The same length along the normal lifts such a
+ * ray's origin off the surface. */
+double pl_hit_epsilon(const pl_surface *surface, const pl_ray *ray, double t);
+
 /* The tracer's counters of the last primary ray (for the extra channels) and totals. */
 typedef struct pl_counters {
     uint64_t box_tests, primitive_tests;

@@ -129,13 +129,17 @@ PL_API const char *pl_symbol_name(const pl_scene *scene, int32_t symbol);
 PL_API const char *pl_rule_place(const pl_scene *scene, int32_t rule);
 
 /* The unfolding, batch by batch, in derivation order. kind: shape id (0: mesh) · matrix: 12 a primitive, row-major
- * 3x4 object to world, composed down the path · argument: the shape's first argument (0: none) or mesh index · texture: index of the texture
- * values at pl_unfold_texture · Returns the number of primitives written (0: finished), or -1 on an error. */
+ * 3x4 object to world, composed down the path · argument: the shape's first argument (0: none) or mesh index · texture: number for
+ * pl_scene_texture (-1: none) · Returns the number of primitives written (0: finished), or -1 on an error. */
 typedef struct pl_unfolding pl_unfolding;
 PL_API pl_unfolding *pl_unfold_begin(pl_scene *scene, pl_error *error);
 PL_API int64_t pl_unfold_next(pl_unfolding *unfolding, size_t capacity, int32_t *kind, double *matrix, double *argument,
                               int32_t *texture, int32_t *symbol, int32_t *depth, pl_error *error);
 PL_API void pl_unfold_end(pl_unfolding *unfolding);
+
+/* The values of a texture (bytecode.toml's texture record, entries included) before its own code changes some of them;
+ * *size numbers that live as long as the scene. NULL: there is no such texture. */
+PL_API const double *pl_scene_texture(const pl_scene *scene, int32_t texture, uint32_t *size);
 
 /* The disassembly as a NUL-terminated text to be freed with pl_free, or NULL. */
 PL_API char *pl_disassemble(const void *bytecode, size_t length, pl_error *error);

@@ -1,0 +1,65 @@
+/* accel.h - the contract of an accelerator.
+ *
+ * An accelerator finds leaves that a ray may hit and hands each of them, with the ray mapped into the leaf's frame one
+ * transformation after another (pl_map_ray), to pl_query_leaf. That call is the normative hit: it alone evaluates t and decides
+ * between candidates (smaller t; on equal t the earlier path). So an accelerator may visit too many leaves, in any
+ * order, but must never leave out one with a root in the query's range: its boxes are widened by reach.h's slack, and it
+ * may skip a box only when the box lies beyond query->t_max, which shrinks as hits are found.
+ *
+ * To add one: a file here with its `const pl_accel`, a line in the table of scene.c, a name in plsys.h. */
+#ifndef PL_ACCEL_H
+#define PL_ACCEL_H
+
+#include "../scene.h"
+
+typedef enum pl_query_kind { PL_QUERY_NEAREST, PL_QUERY_ANY, PL_QUERY_ALL } pl_query_kind;
+
+struct pl_hit_list;
+
+/* What is asked for. */
+typedef struct pl_query {
+    pl_query_kind kind;
+    double t_min, t_max; /* open interval; t_max shrinks to just beyond the best hit */
+    bool shadow;         /* skip what stands below no_shadow */
+    bool found, done;    /* done: no more leaves are wanted */
+    pl_hit *hit;         /* nearest: the best so far */
+    struct pl_hit_list *list; /* all */
+    pl_path *scratch;
+    pl_error *error;
+} pl_query;
+
+/* A candidate. path writes its union terms from the root when they are needed. */
+typedef struct pl_leaf {
+    uint32_t shape; /* unused when mesh is set */
+    const double *arguments;
+    const pl_mesh_tree *mesh;
+    uint64_t primitive;
+    bool (*path)(const void *source, pl_path *path);
+    const void *source;
+} pl_leaf;
+
+/* Offers a leaf; o, d: the ray in its frame. false: an error. */
+bool pl_query_leaf(pl_query *query, const pl_leaf *leaf, const double o[3], const double d[3]);
+
+struct pl_accel {
+    const char *name;
+    bool states, node_boxes; /* what it needs to be built before */
+    bool (*build)(pl_scene *scene, pl_error *error); /* fills scene->structure; may be NULL */
+    void (*destroy)(pl_scene *scene);
+    /* A tracer's working memory. */
+    void *(*work_create)(const pl_scene *scene, pl_error *error);
+    void (*work_destroy)(void *work);
+    /* Offers all leaves that matter. false: an error. */
+    bool (*trace)(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
+};
+
+extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh;
+
+/* One step of the normative chain. */
+static inline void pl_map_ray(const pl_transform *transform, double o[3], double d[3])
+{
+    pl_affine_point(&transform->to_object, o, o);
+    pl_affine_vector(&transform->to_object, d, d);
+}
+
+#endif

@@ -1,0 +1,107 @@
+/* query.c - the one place where a leaf is intersected and candidates are compared (accel.h). */
+#include "query.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "../error.h"
+
+static bool keep_nearest(pl_query *query, const pl_leaf *leaf, const pl_root *root)
+{
+    pl_hit *hit = query->hit;
+    if (root->t == hit->t) {
+        if (!leaf->path(leaf->source, query->scratch)) return pl_fail_memory(query->error, "tracing a ray");
+        if (pl_path_compare(query->scratch, &hit->path) >= 0) return true;
+    }
+    if (!leaf->path(leaf->source, &hit->path)) return pl_fail_memory(query->error, "tracing a ray");
+    hit->t = root->t;
+    hit->primitive = leaf->primitive;
+    hit->part = root->part;
+    /* Just beyond, so that others at the same t are still compared; never beyond what was asked for. */
+    double beyond = nextafter(root->t, INFINITY);
+    if (beyond < query->t_max) query->t_max = beyond;
+    return true;
+}
+
+static bool keep_listed(pl_query *query, const pl_leaf *leaf, const pl_root *root)
+{
+    pl_hit_list *list = query->list;
+    if (list->count == list->capacity) {
+        size_t capacity = list->capacity ? 2 * list->capacity : 16;
+        pl_hit *hits = realloc(list->hits, capacity * sizeof *hits);
+        if (!hits) return pl_fail_memory(query->error, "tracing a ray");
+        for (size_t i = list->capacity; i < capacity; i++) pl_hit_init(&hits[i]);
+        list->hits = hits;
+        list->capacity = capacity;
+    }
+    pl_hit *hit = &list->hits[list->count];
+    if (!leaf->path(leaf->source, &hit->path)) return pl_fail_memory(query->error, "tracing a ray");
+    hit->t = root->t;
+    hit->primitive = leaf->primitive;
+    hit->part = root->part;
+    list->count++;
+    return true;
+}
+
+static bool keep(pl_query *query, const pl_leaf *leaf, const pl_root *root)
+{
+    query->found = true;
+    switch (query->kind) {
+    case PL_QUERY_NEAREST: return keep_nearest(query, leaf, root);
+    case PL_QUERY_ALL: return keep_listed(query, leaf, root);
+    default: query->done = true; return true;
+    }
+}
+
+typedef struct mesh_visit {
+    pl_query *query;
+    const pl_leaf *leaf;
+    bool ok;
+} mesh_visit;
+
+static bool keep_mesh_root(void *context, pl_root root)
+{
+    mesh_visit *v = context;
+    v->ok = keep(v->query, v->leaf, &root);
+    return v->ok;
+}
+
+bool pl_query_leaf(pl_query *query, const pl_leaf *leaf, const double o[3], const double d[3])
+{
+    pl_root roots[PL_SHAPE_ROOTS];
+    if (leaf->mesh && query->kind == PL_QUERY_ALL) {
+        mesh_visit v = {query, leaf, true};
+        pl_mesh_each(leaf->mesh, o, d, query->t_min, query->t_max, keep_mesh_root, &v);
+        return v.ok;
+    }
+    if (leaf->mesh) {
+        return !pl_mesh_nearest(leaf->mesh, o, d, query->t_min, query->t_max, roots) || keep(query, leaf, roots);
+    }
+    int count = pl_shape_of(leaf->shape)->roots(leaf->arguments, o, d, query->t_min, query->t_max, roots);
+    if (query->kind != PL_QUERY_ALL && count > 1) count = 1;
+    for (int i = 0; i < count; i++)
+        if (!keep(query, leaf, &roots[i])) return false;
+    return true;
+}
+
+/* (t, path), then the root's order on its leaf. */
+static int compare_hits(const void *a, const void *b)
+{
+    const pl_hit *x = a, *y = b;
+    if (x->t != y->t) return x->t < y->t ? -1 : 1;
+    int order = pl_path_compare(&x->path, &y->path);
+    return order ? order : (x->part > y->part) - (x->part < y->part);
+}
+
+void pl_hit_list_sort(pl_hit_list *list)
+{
+    if (list->count > 1) qsort(list->hits, list->count, sizeof *list->hits, compare_hits);
+}
+
+void pl_hit_list_free(pl_hit_list *list)
+{
+    if (!list) return;
+    for (size_t i = 0; i < list->capacity; i++) pl_hit_free(&list->hits[i]);
+    free(list->hits);
+    free(list);
+}

@@ -1,0 +1,149 @@
+/* intersect.c - many rays at once: pl_intersect and pl_occluded, shared among threads in chunks. A ray's answer depends on
+ * the ray alone, so neither the chunks nor the threads show in the results. */
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+
+#include "error.h"
+#include "scene.h"
+
+enum { CHUNK = 512 };
+
+typedef struct job {
+    pl_scene *scene;
+    size_t n;
+    const double *origins, *directions, *distance;
+    const pl_hits *hits; /* NULL: occlusion */
+    uint8_t *occluded;
+    atomic_size_t next;    /* first ray of the next chunk */
+    atomic_bool stop;
+    pthread_mutex_t lock;
+    pl_error error;        /* that of the lowest ray that failed, which is the one a single thread would meet */
+    size_t failed;
+} job;
+
+static bool set_ray(const job *j, size_t i, pl_ray *ray, pl_error *error)
+{
+    double length = 0.0;
+    for (int axis = 0; axis < 3; axis++) {
+        ray->origin[axis] = j->origins[3 * i + (size_t)axis];
+        ray->direction[axis] = j->directions[3 * i + (size_t)axis];
+        length = fmax(length, fabs(ray->direction[axis]));
+        if (!isfinite(ray->origin[axis]) || !isfinite(ray->direction[axis]))
+            return pl_fail(error, PL_ERROR_ARGUMENT, "rays", "ray %zu has a number that isn't finite", i);
+    }
+    if (length == 0.0) return pl_fail(error, PL_ERROR_ARGUMENT, "rays", "the direction of ray %zu is zero", i);
+    ray->t_min = 0.0;
+    ray->t_max = j->distance ? j->distance[i] : INFINITY;
+    ray->shadow = false;
+    return true;
+}
+
+static bool describe(pl_tracer *tracer, const pl_hits *out, size_t i, const pl_ray *ray, const pl_hit *hit,
+                     pl_error *error)
+{
+    bool found = hit->t < INFINITY;
+    pl_surface surface = {.symbol = -1, .rule = -1};
+    if (found && (out->symbol || out->rule || out->depth || out->normal) &&
+        !pl_trace_surface(tracer, ray, hit, &surface, error))
+        return false;
+    if (out->t) out->t[i] = hit->t;
+    if (out->bound) out->bound[i] = hit->bound;
+    if (out->primitive)
+        out->primitive[i] = !found ? -1 : hit->primitive > INT64_MAX ? INT64_MAX : (int64_t)hit->primitive;
+    if (out->symbol) out->symbol[i] = surface.symbol;
+    if (out->rule) out->rule[i] = surface.rule;
+    if (out->depth) out->depth[i] = surface.depth;
+    for (size_t axis = 0; out->normal && axis < 3; axis++) out->normal[3 * i + axis] = surface.normal[axis];
+    return true;
+}
+
+static bool trace_one(job *j, pl_tracer *tracer, size_t i, pl_hit *hit, pl_error *error)
+{
+    pl_ray ray;
+    if (!set_ray(j, i, &ray, error)) return false;
+    if (j->hits) return pl_trace_nearest(tracer, &ray, hit, error) && describe(tracer, j->hits, i, &ray, hit, error);
+    int found = pl_trace_any(tracer, &ray, error);
+    j->occluded[i] = found > 0;
+    return found >= 0;
+}
+
+static void report(job *j, size_t ray, const pl_error *error)
+{
+    pthread_mutex_lock(&j->lock);
+    if (j->error.code == PL_OK || ray < j->failed) {
+        j->error = *error;
+        j->failed = ray;
+    }
+    pthread_mutex_unlock(&j->lock);
+    atomic_store(&j->stop, true);
+}
+
+static void *work(void *context)
+{
+    job *j = context;
+    pl_error error;
+    pl_error_clear(&error);
+    pl_tracer *tracer = pl_tracer_create(j->scene, &error);
+    if (!tracer) {
+        report(j, j->n, &error);
+        return NULL;
+    }
+    pl_hit hit;
+    pl_hit_init(&hit);
+    while (!atomic_load(&j->stop)) {
+        size_t first = atomic_fetch_add(&j->next, CHUNK);
+        if (first >= j->n) break;
+        size_t end = j->n - first < CHUNK ? j->n : first + CHUNK;
+        size_t i = first;
+        while (i < end && trace_one(j, tracer, i, &hit, &error)) i++;
+        if (i == end) continue;
+        report(j, i, &error);
+        break;
+    }
+    pl_scene_count(j->scene, tracer, &(pl_ray_counts){0});
+    pl_hit_free(&hit);
+    pl_tracer_destroy(tracer);
+    return NULL;
+}
+
+static bool run(job *j, pl_error *error)
+{
+    pl_error_clear(error);
+    if (j->n && (!j->origins || !j->directions || (!j->hits && !j->occluded)))
+        return pl_fail(error, PL_ERROR_ARGUMENT, "rays", "an array is missing");
+    pl_error_clear(&j->error);
+    pthread_mutex_init(&j->lock, NULL);
+    size_t chunks = (j->n + CHUNK - 1) / CHUNK, wanted = (size_t)pl_scene_threads(j->scene);
+    size_t others = wanted < chunks ? wanted - 1 : chunks ? chunks - 1 : 0, started = 0;
+    pthread_t *threads = others ? malloc(others * sizeof *threads) : NULL;
+    while (threads && started < others && pthread_create(&threads[started], NULL, work, j) == 0) started++;
+    if (j->n) work(j);
+    for (size_t i = 0; i < started; i++) pthread_join(threads[i], NULL);
+    free(threads);
+    pthread_mutex_destroy(&j->lock);
+    if (j->error.code == PL_OK) return true;
+    if (error) *error = j->error;
+    return false;
+}
+
+bool pl_intersect(pl_scene *scene, size_t n, const double *origins, const double *directions, const pl_hits *hits,
+                  pl_error *error)
+{
+    static const pl_hits nothing = {0};
+    job j = {.scene = scene, .n = n, .origins = origins, .directions = directions, .hits = hits ? hits : &nothing};
+    return run(&j, error);
+}
+
+bool pl_occluded(pl_scene *scene, size_t n, const double *origins, const double *directions, const double *distance,
+                 uint8_t *occluded, pl_error *error)
+{
+    job j = {.scene = scene,
+             .n = n,
+             .origins = origins,
+             .directions = directions,
+             .distance = distance,
+             .occluded = occluded};
+    return run(&j, error);
+}

@@ -1,0 +1,277 @@
+/* scene.c - a scene's life: bytecode -> program -> meshes, states, accelerator; records and statistics (plsys.h, trace.h). */
+#include "scene.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "accel/accel.h"
+#include "error.h"
+#include "table.h"
+
+static const pl_accel *const accelerators[] = {
+    [PL_AUTO] = &pl_accel_bvh, [PL_NONE] = &pl_accel_none, [PL_BOXES] = &pl_accel_boxes, [PL_BVH] = &pl_accel_bvh};
+static const int accelerator_ids[] = {[PL_AUTO] = PL_BVH, [PL_NONE] = PL_NONE, [PL_BOXES] = PL_BOXES, [PL_BVH] = PL_BVH};
+
+enum { MOST_THREADS = 1024 };
+
+double pl_seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* --- transparency --- */
+
+/* Whether a piece of a texture's code sets a filter or transmit. Verified code: operands are complete and it ends. */
+static bool code_sets_transparency(const pl_program *program, uint32_t code)
+{
+    const uint8_t *at = program->code + (code - 1);
+    while (*at != PL_OP_END) {
+        uint8_t opcode = *at++;
+        if (pl_op_row_of(opcode)->operand == PL_OPERAND_NONE) continue;
+        uint32_t value = 0;
+        for (int shift = 0;; shift += 7) {
+            value |= (uint32_t)(*at & 0x7F) << shift;
+            if (!(*at++ & 0x80)) break;
+        }
+        if (opcode != PL_OP_TEXTURE_SET || value < PL_TEXTURE_VALUES) continue;
+        uint32_t in_entry = (value - PL_TEXTURE_VALUES) % PL_TEXTURE_ENTRY;
+        if (in_entry == PL_TEXTURE_ENTRY_FILTER || in_entry == PL_TEXTURE_ENTRY_TRANSMIT) return true;
+    }
+    return false;
+}
+
+static bool is_opaque(const pl_program *program)
+{
+    for (uint32_t i = 0; i < program->record_count; i++) {
+        const pl_record *record = &program->records[i];
+        if (record->kind != PL_RECORD_TEXTURE) continue;
+        for (uint32_t k = 0; k < record->entries; k++) {
+            const double *entry = record->values + PL_TEXTURE_VALUES + (size_t)k * PL_TEXTURE_ENTRY;
+            if (entry[PL_TEXTURE_ENTRY_FILTER] != 0.0 || entry[PL_TEXTURE_ENTRY_TRANSMIT] != 0.0) return false;
+        }
+    }
+    for (uint32_t i = 0; i < program->node_count; i++) {
+        const pl_node *node = &program->nodes[i];
+        if (node->kind == PL_NODE_TEXTURE && node->as.texture.code &&
+            code_sets_transparency(program, node->as.texture.code))
+            return false;
+    }
+    return true;
+}
+
+/* --- creation --- */
+
+static bool check_options(const pl_options *options, pl_error *error)
+{
+    if (options->accelerator < PL_AUTO || options->accelerator > PL_BVH)
+        return pl_fail(error, PL_ERROR_ARGUMENT, "accelerator", "there is no accelerator number %d", options->accelerator);
+    if (options->threads < 0 || options->threads > MOST_THREADS)
+        return pl_fail(error, PL_ERROR_ARGUMENT, "threads", "%d threads; 1 to %d, or 0 for one a core", options->threads,
+                       MOST_THREADS);
+    return true;
+}
+
+/* Half of the machine's memory, at most PL_STATES_DEFAULT_BYTES. */
+static size_t default_memory(void)
+{
+    long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
+    size_t half = pages > 0 && page > 0 ? (size_t)pages / 2 * (size_t)page : PL_STATES_DEFAULT_BYTES;
+    return half < PL_STATES_DEFAULT_BYTES ? half : PL_STATES_DEFAULT_BYTES;
+}
+
+static bool build_meshes(pl_scene *scene, pl_error *error)
+{
+    const pl_program *program = scene->program;
+    scene->meshes = calloc(program->mesh_count + 1, sizeof *scene->meshes);
+    if (!scene->meshes) return pl_fail_memory(error, "building the meshes");
+    for (uint32_t i = 0; i < program->mesh_count; i++) {
+        scene->meshes[i] = pl_mesh_tree_build(&program->meshes[i]);
+        if (!scene->meshes[i]) return pl_fail_memory(error, "building the meshes");
+        scene->mesh_bytes += pl_mesh_tree_bytes(scene->meshes[i]);
+    }
+    return true;
+}
+
+static bool find_rule_places(pl_scene *scene, pl_error *error)
+{
+    const pl_program *program = scene->program;
+    scene->rule_places = calloc(program->rule_count + 1, sizeof *scene->rule_places);
+    if (!scene->rule_places) return pl_fail_memory(error, "loading the scene");
+    for (uint32_t i = 0; i < program->rule_count; i++) {
+        char place[256];
+        scene->rule_places[i] = strdup(pl_program_place(program, program->rules[i], place, sizeof place));
+        if (!scene->rule_places[i]) return pl_fail_memory(error, "loading the scene");
+    }
+    return true;
+}
+
+static bool build(pl_scene *scene, pl_error *error)
+{
+    double start = pl_seconds();
+    const pl_accel *accel = scene->accel;
+    size_t limit = scene->options.memory ? scene->options.memory : default_memory();
+    if (!build_meshes(scene, error) || !find_rule_places(scene, error)) return false;
+    if (accel->states &&
+        !pl_states_build(&scene->states, scene->program, scene->meshes, accel->node_boxes, limit, error))
+        return false;
+    if (accel->build && !accel->build(scene, error)) return false;
+    scene->all_opaque = is_opaque(scene->program);
+
+    pl_statistics *counts = &scene->statistics;
+    counts->primitives = UINT64_MAX;
+    if (accel->states) {
+        const pl_state *root = &scene->states.list[0];
+        counts->primitives = root->primitives;
+        counts->singular = root->singular;
+        counts->depth = root->depth;
+        counts->states = scene->states.count - 1; /* the scene itself is none */
+    }
+    counts->scene_bytes = sizeof *scene + scene->program->bytes + scene->mesh_bytes + scene->states.bytes;
+    counts->accelerator = accelerator_ids[scene->options.accelerator];
+    counts->threads = scene->threads;
+    counts->seconds_build = pl_seconds() - start;
+    return true;
+}
+
+pl_scene *pl_scene_create(const void *bytecode, size_t length, const pl_options *options, pl_error *error)
+{
+    static const pl_options defaults = {0};
+    pl_error_clear(error);
+    if (!options) options = &defaults;
+    if (!bytecode && length) {
+        pl_fail(error, PL_ERROR_ARGUMENT, "bytecode", "no bytes given");
+        return NULL;
+    }
+    if (!check_options(options, error)) return NULL;
+    pl_scene *scene = calloc(1, sizeof *scene);
+    if (!scene) {
+        pl_fail_memory(error, "loading the scene");
+        return NULL;
+    }
+    pthread_mutex_init(&scene->lock, NULL);
+    scene->options = *options;
+    scene->accel = accelerators[options->accelerator];
+    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    scene->threads = options->threads ? options->threads : cores > 0 ? (int)cores : 1;
+    double start = pl_seconds();
+    scene->program = pl_program_load(bytecode, length, error);
+    scene->statistics.seconds_verify = pl_seconds() - start;
+    if (scene->program && build(scene, error)) return scene;
+    pl_scene_destroy(scene);
+    return NULL;
+}
+
+void pl_scene_destroy(pl_scene *scene)
+{
+    if (!scene) return;
+    if (scene->accel->destroy) scene->accel->destroy(scene);
+    pl_states_free(&scene->states);
+    if (scene->program) {
+        for (uint32_t i = 0; scene->meshes && i < scene->program->mesh_count; i++) pl_mesh_tree_free(scene->meshes[i]);
+        for (uint32_t i = 0; scene->rule_places && i < scene->program->rule_count; i++) free(scene->rule_places[i]);
+    }
+    free(scene->meshes);
+    free(scene->rule_places);
+    pl_program_free(scene->program);
+    pthread_mutex_destroy(&scene->lock);
+    free(scene);
+}
+
+void pl_free(void *pointer)
+{
+    free(pointer);
+}
+
+/* --- what a scene tells --- */
+
+const double *pl_scene_settings(const pl_scene *scene)
+{
+    return scene->program->settings;
+}
+
+const double *pl_scene_camera(const pl_scene *scene)
+{
+    return scene->program->camera;
+}
+
+uint32_t pl_scene_lights(const pl_scene *scene, const double *const **lights)
+{
+    *lights = scene->program->lights;
+    return scene->program->light_count;
+}
+
+bool pl_scene_all_opaque(const pl_scene *scene)
+{
+    return scene->all_opaque;
+}
+
+bool pl_scene_povray_epsilon(const pl_scene *scene)
+{
+    return scene->options.povray_epsilon;
+}
+
+int pl_scene_threads(const pl_scene *scene)
+{
+    return scene->threads;
+}
+
+const char *pl_symbol_name(const pl_scene *scene, int32_t symbol)
+{
+    const pl_program *program = scene->program;
+    if (symbol < 0 || (uint32_t)symbol >= program->symbol_count) return "";
+    return program->strings[program->nodes[program->symbols[symbol]].as.symbol.name].text;
+}
+
+const char *pl_rule_place(const pl_scene *scene, int32_t rule)
+{
+    const pl_program *program = scene->program;
+    for (uint32_t i = 0; i < program->rule_count && rule >= 0; i++)
+        if (program->nodes[program->rules[i]].as.rule.index == (uint32_t)rule) return scene->rule_places[i];
+    return "";
+}
+
+const double *pl_scene_texture(const pl_scene *scene, int32_t texture, uint32_t *size)
+{
+    *size = 0;
+    if (texture < 0 || (uint32_t)texture >= scene->program->record_count) return NULL;
+    const pl_record *record = &scene->program->records[texture];
+    if (record->kind != PL_RECORD_TEXTURE) return NULL;
+    *size = record->size;
+    return record->values;
+}
+
+/* --- statistics --- */
+
+void pl_scene_count(pl_scene *scene, const pl_tracer *tracer, const pl_ray_counts *rays)
+{
+    pthread_mutex_lock(&scene->lock);
+    pl_statistics *counts = &scene->statistics;
+    counts->box_tests += tracer->counters.box_tests;
+    counts->primitive_tests += tracer->counters.primitive_tests;
+    counts->rays_primary += rays->primary;
+    counts->rays_shadow += rays->shadow;
+    counts->rays_reflection += rays->reflection;
+    counts->rays_transmitted += rays->transmitted;
+    counts->bailout += rays->bailout;
+    counts->trace_level += rays->trace_level;
+    pthread_mutex_unlock(&scene->lock);
+}
+
+void pl_scene_count_seconds(pl_scene *scene, double trace)
+{
+    pthread_mutex_lock(&scene->lock);
+    scene->statistics.seconds_trace += trace;
+    pthread_mutex_unlock(&scene->lock);
+}
+
+void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics)
+{
+    pl_scene *locked = (pl_scene *)scene; /* only the lock changes */
+    pthread_mutex_lock(&locked->lock);
+    *statistics = scene->statistics;
+    pthread_mutex_unlock(&locked->lock);
+}

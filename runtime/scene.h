@@ -1,0 +1,48 @@
+/* scene.h - what a scene holds: program, meshes, states, accelerator, statistics; and a tracer's working memory. */
+#ifndef PL_SCENE_H
+#define PL_SCENE_H
+
+#include <pthread.h>
+
+#include "shapes/mesh.h"
+#include "state.h"
+#include "trace.h"
+
+typedef struct pl_accel pl_accel;
+
+struct pl_scene {
+    pl_program *program;
+    pl_mesh_tree **meshes;
+    pl_states states; /* empty where the accelerator needs none */
+    const pl_accel *accel;
+    void *structure; /* the accelerator's */
+    size_t mesh_bytes;
+    pl_options options;
+    int threads;
+    bool all_opaque;
+    char **rule_places; /* of program->rules */
+    pthread_mutex_t lock; /* of statistics */
+    pl_statistics statistics;
+};
+
+/* Growing array of transformations, from the root to a leaf. */
+typedef struct pl_chain {
+    pl_transform *list;
+    size_t count, capacity;
+} pl_chain;
+
+struct pl_tracer {
+    const pl_scene *scene;
+    void *work; /* the accelerator's */
+    pl_counters counters;
+    pl_walk walk; /* of pl_trace_surface */
+    pl_chain chain;
+    double *texture; /* values that code fills in */
+    pl_path scratch;
+    struct pl_hit_list *list;
+};
+
+/* A monotonic clock. */
+double pl_seconds(void);
+
+#endif

@@ -1,0 +1,23 @@
+/* triangle.c - the flat triangle (0,0,0) (1,0,0) (0,1,0). */
+#include <stddef.h>
+
+#include "flat.h"
+
+static double support(const double *arguments, const double u[3])
+{
+    (void)arguments;
+    return fmax(0.0, fmax(u[0], u[1]));
+}
+
+static int roots(const double *arguments, const double o[3], const double d[3], double t_min, double t_max,
+                 pl_root out[PL_SHAPE_ROOTS])
+{
+    (void)arguments;
+    double t, x, y, slack;
+    if (!pl_flat_crossing(o, d, t_min, t_max, &t, &x, &y, &slack)) return 0;
+    if (!(x >= -slack && y >= -slack && x + y <= 1.0 + slack)) return 0;
+    out[0] = (pl_root){t, 0};
+    return 1;
+}
+
+const pl_shape pl_triangle = {support, roots, pl_flat_normal, NULL};

@@ -1,0 +1,428 @@
+/* state.c - exploring the shared states (state.h): depth first from the scene, each state once.
+ *
+ * A visit derives one application of a state's symbol, keeps the scopes of the symbols that it enters, looks those up or
+ * visits them, and when all are known joins their boxes and counts. The stack of visits is on the heap. Scopes carry
+ * all parameters of the first instance that reaches a state; others with equal live parameters have the same geometry. */
+#include "state.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "error.h"
+#include "random.h"
+
+enum { FIRST_TABLE = 64, FIRST_BLOCK = 4096, LARGEST_BLOCK = 1 << 20 };
+
+struct pl_block {
+    struct pl_block *next;
+    size_t used, size;
+    _Alignas(16) unsigned char memory[];
+};
+
+typedef struct visit {
+    uint32_t state, next_item;
+    size_t scopes, cursor;       /* where its entered symbols' packed scopes begin; the next one to be taken */
+    size_t trails, trail_counts; /* where its items' trails and their lengths begin */
+} visit;
+
+/* A growing array of fixed-size elements. */
+typedef struct array {
+    void *data;
+    size_t count, capacity, element;
+} array;
+
+typedef struct builder {
+    pl_states *states;
+    pl_walk walk;
+    pl_scope scope;
+    array items, chain, path, visits, scopes, trails, trail_counts, key;
+    pl_error *error;
+} builder;
+
+/* Room for `more` elements at the end; NULL: no memory. */
+static void *extend(array *a, size_t more)
+{
+    if (a->count + more > a->capacity) {
+        size_t capacity = 2 * (a->count + more) + 8;
+        void *data = realloc(a->data, capacity * a->element);
+        if (!data) return NULL;
+        a->data = data;
+        a->capacity = capacity;
+    }
+    void *place = (char *)a->data + a->count * a->element;
+    a->count += more;
+    return place;
+}
+
+/* --- memory --- */
+
+static bool over_limit(const pl_states *states, size_t more, pl_error *error)
+{
+    if (states->bytes + more <= states->limit) return false;
+    pl_fail(error, PL_ERROR_LIMIT, "states", "memory: %u states need more than the %zu bytes allowed",
+            (unsigned)states->count, states->limit);
+    return true;
+}
+
+void *pl_states_allocate(pl_states *states, size_t bytes, pl_error *error)
+{
+    bytes = (bytes + 15) & ~(size_t)15;
+    struct pl_block *block = states->blocks;
+    if (!block || block->used + bytes > block->size) {
+        size_t size = block ? 2 * block->size : FIRST_BLOCK;
+        if (size > LARGEST_BLOCK) size = LARGEST_BLOCK;
+        if (size < bytes) size = bytes;
+        if (over_limit(states, size, error)) return NULL;
+        struct pl_block *fresh = malloc(sizeof *fresh + size);
+        if (!fresh) {
+            pl_fail_memory(error, "building the states");
+            return NULL;
+        }
+        *fresh = (struct pl_block){.next = block, .size = size};
+        states->blocks = block = fresh;
+        states->bytes += sizeof *fresh + size;
+    }
+    void *place = block->memory + block->used;
+    block->used += bytes;
+    return place;
+}
+
+static void *keep(builder *b, const void *data, size_t bytes)
+{
+    void *place = pl_states_allocate(b->states, bytes ? bytes : 1, b->error);
+    if (place && bytes) memcpy(place, data, bytes);
+    return place;
+}
+
+void pl_states_free(pl_states *states)
+{
+    for (struct pl_block *block = states->blocks; block;) {
+        struct pl_block *next = block->next;
+        free(block);
+        block = next;
+    }
+    free(states->list);
+    free(states->table);
+    free(states->node_boxes);
+    memset(states, 0, sizeof *states);
+}
+
+/* --- the table --- */
+
+/* The key of the state that a scope leads to at a symbol node: symbol · live parameters · random key. */
+static bool make_key(builder *b, uint32_t symbol, const pl_scope *scope)
+{
+    const pl_program *program = b->states->program;
+    const pl_node *node = &program->nodes[symbol];
+    uint32_t live = node->as.symbol.live_count;
+    b->key.count = 0;
+    uint64_t *key = extend(&b->key, live + 2);
+    if (!key) return pl_fail_memory(b->error, "building the states");
+    key[0] = symbol;
+    for (uint32_t i = 0; i < live; i++) {
+        double value = scope->parameters[program->slots[node->as.symbol.live_first + i]];
+        key[1 + i] = isnan(value) ? UINT64_MAX : pl_bits(value);
+    }
+    key[1 + live] = node->as.symbol.draws ? scope->key : 0;
+    return true;
+}
+
+static uint64_t hash_key(const uint64_t *key, size_t words)
+{
+    uint64_t hash = 0;
+    for (size_t i = 0; i < words; i++) hash = pl_mix(hash, key[i]);
+    return hash;
+}
+
+static size_t key_words(const pl_states *states, uint32_t symbol)
+{
+    return states->program->nodes[symbol].as.symbol.live_count + 2;
+}
+
+/* The slot of b->key in the table: taken by its state or free. */
+static uint32_t find_slot(const pl_states *states, const uint64_t *key)
+{
+    size_t words = key_words(states, (uint32_t)key[0]);
+    uint32_t mask = states->table_size - 1, slot = (uint32_t)hash_key(key, words) & mask;
+    for (; states->table[slot]; slot = (slot + 1) & mask) {
+        const pl_state *state = &states->list[states->table[slot] - 1];
+        if (state->symbol == (uint32_t)key[0] && memcmp(state->key, key, words * sizeof *key) == 0) break;
+    }
+    return slot;
+}
+
+static bool grow_table(pl_states *states, pl_error *error)
+{
+    uint32_t size = states->table_size ? 2 * states->table_size : FIRST_TABLE;
+    uint32_t *table = calloc(size, sizeof *table), *old = states->table;
+    if (!table) return pl_fail_memory(error, "building the states");
+    states->bytes += (size - states->table_size) * sizeof *table;
+    states->table = table;
+    states->table_size = size;
+    for (uint32_t i = 0; i < states->count; i++)
+        if (states->list[i].key) table[find_slot(states, states->list[i].key)] = i + 1;
+    free(old);
+    return true;
+}
+
+/* A new, empty state at the end of the list. */
+static pl_state *add_state(builder *b, uint32_t symbol, const uint64_t *key)
+{
+    pl_states *states = b->states;
+    if (states->count == states->capacity) {
+        uint32_t capacity = states->capacity ? 2 * states->capacity : 16;
+        size_t more = (capacity - states->capacity) * sizeof *states->list;
+        if (over_limit(states, more, b->error)) return NULL;
+        pl_state *list = realloc(states->list, capacity * sizeof *list);
+        if (!list) {
+            pl_fail_memory(b->error, "building the states");
+            return NULL;
+        }
+        states->list = list;
+        states->capacity = capacity;
+        states->bytes += more;
+    }
+    pl_state *state = &states->list[states->count++];
+    *state = (pl_state){.symbol = symbol, .box = pl_box_empty(), .key = key, .on_path = true};
+    return state;
+}
+
+/* --- one application --- */
+
+static bool remember_transform(builder *b)
+{
+    const pl_transform *transform = b->walk.transform;
+    if (transform == &b->walk.computed && !(transform = keep(b, transform, sizeof *transform))) return false;
+    b->chain.count = b->walk.at.marks[0]++;
+    const pl_transform **place = extend(&b->chain, 1);
+    if (!place) return pl_fail_memory(b->error, "building the states");
+    *place = transform;
+    return true;
+}
+
+static bool remember_node(builder *b)
+{
+    b->path.count = b->walk.at.marks[1]++;
+    pl_trail_node *place = extend(&b->path, 1);
+    if (!place) return pl_fail_memory(b->error, "building the states");
+    *place = (pl_trail_node){b->walk.node, b->walk.at.marks[0]};
+    return true;
+}
+
+/* Adds the leaf at which the walk stands to the items. */
+static bool add_item(builder *b, uint8_t kind, uint32_t what)
+{
+    pl_walk *walk = &b->walk;
+    pl_item item = {.kind = kind,
+                    .no_shadow = walk->at.no_shadow,
+                    .what = what,
+                    .transform_count = walk->at.marks[0],
+                    .term_count = walk->at.terms};
+    if (kind == PL_NODE_PRIMITIVE) memcpy(item.arguments, walk->arguments, sizeof item.arguments);
+    item.transforms = keep(b, b->chain.data, item.transform_count * sizeof *item.transforms);
+    item.terms = keep(b, walk->path.terms, item.term_count * sizeof *item.terms);
+    if (!item.transforms || !item.terms) return false;
+    pl_item *place = extend(&b->items, 1);
+    uint32_t *trail_count = extend(&b->trail_counts, 1);
+    pl_trail_node *trail = extend(&b->trails, walk->at.marks[1]);
+    if (!place || !trail_count || !trail) return pl_fail_memory(b->error, "building the states");
+    *place = item;
+    *trail_count = walk->at.marks[1];
+    if (*trail_count) memcpy(trail, b->path.data, *trail_count * sizeof *trail);
+    if (kind != PL_NODE_ENTER) return true;
+
+    uint64_t *words = extend(&b->scopes, pl_scope_words(walk->program, &walk->scope));
+    if (!words) return pl_fail_memory(b->error, "building the states");
+    pl_scope_pack(walk->program, &walk->scope, words);
+    pl_walk_prune(walk);
+    return true;
+}
+
+/* Derives the application that b->walk was restarted for into b->items. A symbol's own S-node is announced, not
+ * kept: its box is the state's. */
+static bool derive_items(builder *b)
+{
+    const pl_program *program = b->states->program;
+    b->items.count = 0;
+    for (;;) {
+        switch (pl_walk_next(&b->walk, b->error)) {
+        case PL_EVENT_ERROR: return false;
+        case PL_EVENT_END: return true;
+        case PL_EVENT_NODE:
+            if (program->nodes[b->walk.node].kind != PL_NODE_SYMBOL && !remember_node(b)) return false;
+            break;
+        case PL_EVENT_TRANSFORM:
+            if (!remember_transform(b)) return false;
+            break;
+        case PL_EVENT_TEXTURE: break;
+        case PL_EVENT_ENTER:
+            if (!add_item(b, PL_NODE_ENTER, program->nodes[b->walk.node].as.enter.symbol)) return false;
+            break;
+        case PL_EVENT_PRIMITIVE:
+            if (!add_item(b, PL_NODE_PRIMITIVE, b->walk.shape)) return false;
+            break;
+        case PL_EVENT_MESH:
+            if (!add_item(b, PL_NODE_MESH, b->walk.mesh)) return false;
+            break;
+        }
+    }
+}
+
+/* Begins the visit of a new state; b->walk stands before its first node. */
+static bool begin_visit(builder *b, uint32_t symbol, const uint64_t *key)
+{
+    if (b->visits.count > PL_LIMIT_DEPTH)
+        return pl_fail_at(b->error, PL_ERROR_LIMIT, b->states->program, symbol,
+                          "depth: %s is still being derived %d symbols deep, which is the limit; does its recursion end?",
+                          b->states->program->strings[b->states->program->nodes[symbol].as.symbol.name].text,
+                          PL_LIMIT_DEPTH);
+    visit v = {b->states->count, 0, b->scopes.count, b->scopes.count, b->trails.count, b->trail_counts.count};
+    if (!add_state(b, symbol, key) || !derive_items(b)) return false;
+    pl_item *items = keep(b, b->items.data, b->items.count * sizeof *items);
+    visit *place = extend(&b->visits, 1);
+    if (!items) return false;
+    if (!place) return pl_fail_memory(b->error, "building the states");
+    *place = v;
+    pl_state *state = &b->states->list[v.state];
+    state->items = items;
+    state->item_count = (uint32_t)b->items.count;
+    state->singular = b->walk.singular;
+    return true;
+}
+
+static bool fail_endless(builder *b, uint32_t symbol, const uint64_t *key)
+{
+    const pl_program *program = b->states->program;
+    const pl_node *node = &program->nodes[symbol];
+    char values[256] = "";
+    size_t used = 0;
+    for (uint32_t i = 0; i < node->as.symbol.live_count && used < sizeof values - 1; i++) {
+        char number[PL_NUMBER_TEXT] = "unset";
+        double value;
+        memcpy(&value, &key[1 + i], sizeof value);
+        if (key[1 + i] != UINT64_MAX) pl_number_text(value, number);
+        uint32_t slot = program->slots[node->as.symbol.live_first + i];
+        int wrote = snprintf(values + used, sizeof values - used, "%s%s = %s", used ? ", " : " with ",
+                             program->strings[program->parameters[slot]].text, number);
+        used += wrote > 0 ? (size_t)wrote : 0;
+    }
+    return pl_fail_at(b->error, PL_ERROR_SCENE, program, symbol, "endless recursion: %s%s contains itself",
+                      program->strings[node->as.symbol.name].text, values);
+}
+
+/* --- boxes and counts, once an application's states are known --- */
+
+static void finish_state(builder *b, const visit *v)
+{
+    pl_states *states = b->states;
+    pl_state *state = &states->list[v->state];
+    const pl_trail_node *trail = (const pl_trail_node *)b->trails.data + v->trails;
+    const uint32_t *trail_counts = (const uint32_t *)b->trail_counts.data + v->trail_counts;
+    for (uint32_t i = 0; i < state->item_count; i++) {
+        pl_item *item = (pl_item *)&state->items[i];
+        pl_reach reach;
+        pl_box box = pl_item_box(states, item, &reach);
+        item->first = state->primitives;
+        state->primitives = pl_add_saturating(state->primitives, pl_item_primitives(states, item));
+        if (pl_item_unbounded(states, item) || !(pl_box_is_empty(&box) || pl_box_is_finite(&box)))
+            state->unbounded = true;
+        pl_box_join(&state->box, &box);
+        pl_reach_join(&state->reach, &reach);
+        if (item->kind == PL_NODE_ENTER) {
+            const pl_state *below = &states->list[item->what];
+            state->singular = pl_add_saturating(state->singular, below->singular);
+            if (below->depth > state->depth) state->depth = below->depth;
+        }
+        if (states->node_boxes) pl_join_node_boxes(states, item, trail, trail_counts[i]);
+        trail += trail_counts[i];
+    }
+    state->depth += state->symbol != UINT32_MAX;
+    state->reach.size = fmin(state->reach.size, 1.7320508075688774 * pl_box_reach(&state->box));
+    state->on_path = false;
+    if (states->node_boxes && state->symbol != UINT32_MAX) {
+        pl_node_box *node = &states->node_boxes[state->symbol];
+        pl_box_join(&node->box, &state->box);
+        pl_reach_join(&node->reach, &state->reach);
+        node->unbounded = node->unbounded || state->unbounded;
+    }
+}
+
+/* --- exploring --- */
+
+/* Resolves the next entered symbol of a visit: known states at once, a new one by a visit of its own. */
+static bool resolve_item(builder *b, visit *v)
+{
+    pl_states *states = b->states;
+    pl_item *item = (pl_item *)&states->list[v->state].items[v->next_item++];
+    if (item->kind != PL_NODE_ENTER) return true;
+    uint32_t symbol = item->what;
+    const uint64_t *words = (const uint64_t *)b->scopes.data + v->cursor;
+    pl_scope_unpack(states->program, words, &b->scope);
+    v->cursor += pl_scope_words(states->program, &b->scope);
+    if (!make_key(b, symbol, &b->scope)) return false;
+    uint32_t slot = find_slot(states, b->key.data);
+    if (states->table[slot]) {
+        item->what = states->table[slot] - 1;
+        return !states->list[item->what].on_path || fail_endless(b, symbol, b->key.data);
+    }
+    uint64_t *key = keep(b, b->key.data, b->key.count * sizeof *key);
+    if (!key) return false;
+    item->what = states->count;
+    states->table[slot] = states->count + 1;
+    pl_walk_restart(&b->walk, symbol, &b->scope);
+    if (!begin_visit(b, symbol, key)) return false;
+    return 2 * (uint64_t)states->count < states->table_size || grow_table(states, b->error);
+}
+
+static bool explore(builder *b)
+{
+    if (!grow_table(b->states, b->error) || !begin_visit(b, UINT32_MAX, NULL)) return false;
+    while (b->visits.count) {
+        visit *v = (visit *)b->visits.data + b->visits.count - 1;
+        if (v->next_item < b->states->list[v->state].item_count) {
+            if (!resolve_item(b, v)) return false;
+            continue;
+        }
+        finish_state(b, v);
+        b->scopes.count = v->scopes;
+        b->trails.count = v->trails;
+        b->trail_counts.count = v->trail_counts;
+        b->visits.count--;
+    }
+    return true;
+}
+
+bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree *const *meshes, bool node_boxes,
+                     size_t limit, pl_error *error)
+{
+    memset(states, 0, sizeof *states);
+    states->program = program;
+    states->meshes = meshes;
+    states->limit = limit ? limit : PL_STATES_DEFAULT_BYTES;
+    builder b = {.states = states, .error = error};
+    b.items.element = sizeof(pl_item);
+    b.chain.element = sizeof(pl_transform *);
+    b.path.element = b.trails.element = sizeof(pl_trail_node);
+    b.visits.element = sizeof(visit);
+    b.scopes.element = b.key.element = sizeof(uint64_t);
+    b.trail_counts.element = sizeof(uint32_t);
+    bool ok = pl_walk_begin(&b.walk, program, 0, NULL, error);
+    b.walk.announce = node_boxes;
+    b.scope.parameters = malloc((program->parameter_count + 1) * sizeof(double));
+    if (!b.scope.parameters) ok = pl_fail_memory(error, "building the states");
+    if (ok && node_boxes) {
+        states->node_boxes = malloc(program->node_count * sizeof *states->node_boxes);
+        if (!states->node_boxes) ok = pl_fail_memory(error, "building the states");
+        else states->bytes += program->node_count * sizeof *states->node_boxes;
+        for (uint32_t i = 0; ok && i < program->node_count; i++)
+            states->node_boxes[i] = (pl_node_box){.box = pl_box_empty()};
+    }
+    ok = ok && explore(&b);
+    pl_walk_end(&b.walk);
+    free(b.scope.parameters);
+    array *arrays[] = {&b.items, &b.chain, &b.path, &b.visits, &b.scopes, &b.trails, &b.trail_counts, &b.key};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]->data);
+    if (!ok) pl_states_free(states);
+    return ok;
+}

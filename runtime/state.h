@@ -1,0 +1,98 @@
+/* state.h - the table of shared states: what the scene consists of once equal subtrees are one.
+ *
+ * A state is (symbol, live parameter values, random key if a draw is reachable): all that a subtree's geometry depends
+ * on. Its items are the leaves of one application of the symbol's production, in path order: primitives, meshes and
+ * other states, each below a list of transformations. State 0 is the scene itself (symbol UINT32_MAX).
+ *
+ *     pl_states states;
+ *     if (!pl_states_build(&states, program, meshes, &options, error)) …
+ *     const pl_state *root = &states.list[0];        root->primitives, root->box, root->items[i].state …
+ *     pl_states_free(&states);
+ *
+ * Fig 2.1's tree has 2,049 cylinders and 13 states. Boxes are exact bottom-up unions in each state's own frame; counts
+ * saturate at UINT64_MAX. A state that is reached again on its own path never ends and is an error. */
+#ifndef PL_STATE_H
+#define PL_STATE_H
+
+#include "box.h"
+#include "derive.h"
+#include "reach.h"
+#include "shapes/mesh.h"
+
+typedef struct pl_item {
+    uint8_t kind;    /* PL_NODE_PRIMITIVE, PL_NODE_MESH or PL_NODE_ENTER */
+    bool no_shadow;  /* below no_shadow within this application */
+    uint32_t what;   /* shape id, mesh index, or state index */
+    uint32_t transform_count, term_count;
+    const pl_transform *const *transforms; /* outermost first */
+    const uint32_t *terms;                 /* union terms within this application */
+    double arguments[PL_SHAPE_ARGUMENTS];
+    uint64_t first; /* primitives of this state before this item */
+} pl_item;
+
+typedef struct pl_state {
+    uint32_t symbol; /* node; UINT32_MAX: the scene */
+    uint32_t item_count;
+    const pl_item *items;
+    pl_box box;      /* of the bounded primitives, in this state's frame */
+    pl_reach reach;
+    bool unbounded;  /* has unbounded primitives below */
+    bool on_path;    /* while building: being explored now */
+    uint32_t depth;  /* most symbols entered below, itself included */
+    uint64_t primitives, singular;
+    const uint64_t *key;
+} pl_state;
+
+/* The union, over all instances, of a graph node's boxes in the node's own frame (paper, section 3, made conservative). */
+typedef struct pl_node_box {
+    pl_box box;
+    pl_reach reach;
+    bool unbounded;
+} pl_node_box;
+
+typedef struct pl_states {
+    const pl_program *program;
+    pl_mesh_tree *const *meshes;
+    pl_state *list;
+    uint32_t count, capacity;
+    uint32_t *table; /* open addressing: state + 1; 0: free */
+    uint32_t table_size;
+    pl_node_box *node_boxes; /* per graph node; NULL unless asked for */
+    struct pl_block *blocks; /* memory of items, transformations, terms and keys */
+    size_t bytes, limit;
+} pl_states;
+
+/* limit: bytes that the table may take, 0: PL_STATES_DEFAULT_BYTES. */
+#define PL_STATES_DEFAULT_BYTES ((size_t)4 << 30)
+bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree *const *meshes, bool node_boxes,
+                     size_t limit, pl_error *error);
+void pl_states_free(pl_states *states);
+
+/* The primitive index, in derivation order, of the leaf at a path; UINT64_MAX if the path doesn't exist. */
+uint64_t pl_states_locate(const pl_states *states, const pl_path *path);
+
+/* The box and reach of an item in its state's frame. */
+pl_box pl_item_box(const pl_states *states, const pl_item *item, pl_reach *reach);
+bool pl_item_unbounded(const pl_states *states, const pl_item *item);
+uint64_t pl_item_primitives(const pl_states *states, const pl_item *item);
+
+/* One graph node on the way to a leaf, and how many transformations stand above it within the application. */
+typedef struct pl_trail_node {
+    uint32_t node, transforms;
+} pl_trail_node;
+
+/* Joins an item's box into those of the graph nodes on its trail, going outward from the leaf. */
+void pl_join_node_boxes(pl_states *states, const pl_item *item, const pl_trail_node *trail, uint32_t count);
+
+/* Bump allocation within the limit; freed with the states. NULL: error is set. */
+void *pl_states_allocate(pl_states *states, size_t bytes, pl_error *error);
+
+/* A box under an affine map. */
+pl_box pl_box_map(const pl_affine *map, const pl_box *box);
+
+static inline uint64_t pl_add_saturating(uint64_t a, uint64_t b)
+{
+    return a > UINT64_MAX - b ? UINT64_MAX : a + b;
+}
+
+#endif
