@@ -95,13 +95,15 @@ export default grammar({
 
     // --- scene blocks
 
-    include: ($) => prec.right(seq('#include', field('path', $.string), optional(';'))),
+    include: ($) => prec.right(seq('#include', optional(field('path', $.string)), optional(';'))),
 
     declare: ($) => prec.right(seq(
       field('keyword', choice('#declare', '#local')),
-      field('name', $.name),
-      optional('='),
-      optional(choice(field('value', $.block), $._declared_items)),
+      optional(seq(
+        field('name', $.name),
+        optional('='),
+        optional(choice(field('value', $.block), $._declared_items)),
+      )),
       optional(';'),
     )),
 
@@ -177,7 +179,7 @@ export default grammar({
     // Braces round rules: a habit from C that the reader explains.
     braced: ($) => prec.right(seq('{', repeat($._production), optional('}'))),
 
-    _arrow: ($) => field('arrow', alias(choice('->', '=>', '=', '→'), $.arrow)),
+    _arrow: ($) => field('arrow', alias(choice('->', '=>', '=', '→', /-[ \t]+>/), $.arrow)),
 
     _alternatives: ($) => prec.right(seq($.alternative, repeat(seq('|', $.alternative)), optional(alias('|', $.stray)))),
 
@@ -291,7 +293,8 @@ export default grammar({
 
     _primary: ($) => choice($.number, $.string, $.name, $.call, $.vector, $.parenthesized),
 
-    parenthesized: ($) => seq('(', $._expression, ')'),
+    // More than one expression is a vector in the wrong brackets.
+    parenthesized: ($) => seq('(', $._expression, repeat(seq(',', $._expression)), ')'),
 
     call: ($) => seq(field('name', $.name), token.immediate('('), commaSeparated(field('argument', $._expression)), ')'),
 

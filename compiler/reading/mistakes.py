@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 DEFINITION_WORDS = ("Selection", "Calculation", "Transformation", "Texture", "Parameter")
 CLOSERS = {")": "(", "}": "{", "]": "[", ">": "<"}
+_CLOSER_OF = {opener: closer for closer, opener in CLOSERS.items()}
 
 DEFINITION = (
     "a definition starts with Selection, Calculation, Transformation, Texture, Parameter, #declare, #include "
@@ -52,11 +53,16 @@ _EXPECTED = {
     "include": 'an include looks like #include "forest.plsys"',
 }
 
+# Nodes in which a missing name is one that is being defined or called, and not an operand.
+_NAMING = ("selection", "calculation", "transformation", "parameters", "named_block", "declare", "parameter", "step")
+
 # What may stand outside of strings and comments.
-_KNOWN = re.compile(r"[A-Za-z0-9_\s\"%()*+,\-./:;<=>?\[\]{}!&|→\u00C0-\u1FFF\u2C00-\uD7FF]")
+_KNOWN = re.compile(r"[A-Za-z0-9_\s\"#%()*+,\-./:;<=>?\[\]{}!&|→\u00C0-\u1FFF\u2C00-\uD7FF]")
 
 # Strings and comments inside broken text, of which only the rest is judged.
 _MASKED = re.compile(r'"[^"\r\n]*"|//[^\r\n]*|/\*.*?\*/', re.DOTALL)
+
+_OPERATOR = re.compile(r"(?!\+\+|--)[-+*/%=<>!&|?]+")
 
 # Habits from other languages: the text that went wrong → message and hint.
 _HABITS = (
@@ -134,9 +140,12 @@ def _directive(reading: Reading, node: Node, seen: bool) -> None:
     if not word[1]:
         reading.complain(span, "a directive's name is missing after this '#'", "plsys has #declare and #include")
         return
-    hint = nearest(word[1], _DIRECTIVES) or _INSTEAD.get(word[1], "remove it; plsys has #declare and #include")
-    reading.complain(span, f"#{word[1]} isn't supported", hint.replace("'", "'#", 1) if "mean" in hint else hint,
-                     "unsupported")
+    if word[1] in _DIRECTIVES:
+        reading.complain(span, "a space stands between '#' and the directive's name", f"write #{word[1]}")
+        return
+    hint = nearest(f"#{word[1]}", [f"#{each}" for each in _DIRECTIVES])
+    hint = hint or _INSTEAD.get(word[1], "remove it; plsys has #declare and #include")
+    reading.complain(span, f"#{word[1]} isn't supported", hint, "unsupported")
 
 
 class Break(NamedTuple):
@@ -175,9 +184,12 @@ def _missing(reading: Reading, node: Node) -> Diagnostic:
         opener = next((child for child in parent.children if child.type == CLOSERS[node.type]), None)
         if opener is not None:
             return never_closed(reading, opener.start_byte, opener.type, node.type)
-    what = {"name": "a name", "number": "a value", "string": "a text in quotes"}.get(node.type, f"'{node.type}'")
+    what = f"'{node.type}'"
+    if node.type in ("name", "number", "string"):
+        what = "a name" if parent.type in _NAMING else "a value"
+    hint = "the body of a definition or block stands in braces" if node.type == "{" else _expected(parent)
     end = len(reading.data[: node.start_byte].rstrip())
-    return _diagnostic("missing", reading.after(end), f"{what} is missing here", _expected(parent))
+    return _diagnostic("missing", reading.after(end), f"{what} is missing here", hint)
 
 
 def never_closed(reading: Reading, offset: int, opener: str, closer: str) -> Diagnostic:
@@ -195,8 +207,8 @@ def _expected(node: Node | None) -> str:
     return DEFINITION
 
 
-def unexpected(reading: Reading, node: Node) -> Diagnostic:
-    """The message for an ERROR node."""
+def unexpected(reading: Reading, node: Node, context: Node | None = None) -> Diagnostic:
+    """The message for an ERROR node. ``context`` is the node that it should have become part of."""
     text = _MASKED.sub(lambda match: " " * len(match[0].encode()), reading.text(node))
     for pattern, message, hint in _HABITS:
         if match := pattern.search(text):
@@ -205,9 +217,28 @@ def unexpected(reading: Reading, node: Node) -> Diagnostic:
         if not _KNOWN.match(match[0]):
             message = f"the character '{match[0]}' has no meaning here"
             return _diagnostic("syntax", _part(reading, node, match), message, "remove it")
-    match = re.search(r"\w+|[^\w\s]+", text) or re.search(r"\s*", text)
-    hint = _expected(node.parent)
-    return _diagnostic("syntax", _part(reading, node, match), f"'{match[0][:30]}' is unexpected here", hint)
+    if (opener := _last_open(text)) >= 0:
+        start = node.start_byte + len(text[:opener].encode())
+        rest = re.match(rb"[^;{}\r\n]*", reading.data[node.end_byte :])[0].decode(errors="replace")
+        if _last_open(text[opener:] + rest) == 0:
+            return never_closed(reading, start, text[opener], _CLOSER_OF[text[opener]])
+    match = re.search(r'"[^"]*"|#?\w+|[^\w\s]+', reading.text(node)) or re.search(r"\s*", text)
+    hint = _expected(context or node.parent)
+    span = _part(reading, node, match)
+    if _OPERATOR.fullmatch(match[0]) and re.match(rb"\s*([;)}\],]|$)", reading.data[span.end :]):
+        return _diagnostic("missing", span, f"nothing stands after this '{match[0]}'", hint)
+    return _diagnostic("syntax", span, f"'{match[0][:30]}' is unexpected here", hint)
+
+
+def _last_open(text: str) -> int:
+    """Where the innermost round, square or curly bracket stands that ``text`` opens and doesn't close, or -1."""
+    open_brackets: list[int] = []
+    for i, character in enumerate(text):
+        if character in "([{":
+            open_brackets.append(i)
+        elif character in ")]}" and open_brackets:
+            open_brackets.pop()
+    return open_brackets[-1] if open_brackets else -1
 
 
 def _part(reading: Reading, node: Node, match: re.Match[str]) -> Span:
@@ -236,8 +267,7 @@ def unmatched_bracket(reading: Reading, tree: Tree) -> Diagnostic | None:
     if not open_brackets:
         return None
     opener = open_brackets[-1]
-    closer = next(closer for closer, other in CLOSERS.items() if other == opener.type)
-    return never_closed(reading, opener.start_byte, opener.type, closer)
+    return never_closed(reading, opener.start_byte, opener.type, _CLOSER_OF[opener.type])
 
 
 def unknown_definition(word: str) -> tuple[str, str]:

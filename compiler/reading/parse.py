@@ -101,12 +101,21 @@ class _FileReader:
         """Text between definitions, perhaps with some that tree-sitter recognised inside."""
         items = self.reading.diagnostics.items
         inside = [child for child in node.children if child.type in _DEFINITIONS]
-        error = mistakes.unexpected(self.reading, node)
+        error = mistakes.unexpected(self.reading, node, self.cut_short(node.prev_sibling))
         if not inside or error.span.start < inside[0].start_byte:
             items.append(error)
             self.broken = node
         for child in inside:
             self.definition(child)
+
+    def cut_short(self, node: Node | None) -> Node | None:
+        """The part of a definition that breaks off at its end, if one does."""
+        if node is None or node.type not in _DEFINITIONS:
+            return None
+        body = node.child_by_field_name("body")
+        if body is None:
+            return node if node.children[-1].type != ";" else None
+        return body if body.children[-1].type != "}" else None
 
     def one_definition(self, node: Node) -> None:
         items = self.reading.diagnostics.items
@@ -123,7 +132,12 @@ class _FileReader:
         hoisted, self.hoisted = self.hoisted, []
         if node.has_error and self.broken is None:
             self.report_break(node, before, hoisted[0].start_byte if hoisted else None)
-        items[before + MAX_MESSAGES :] = []
+        following = node.next_sibling
+        if following is not None and (following.type == "ERROR" or self.reading.text(following) in (")", "]")):
+            # What is wrong at this definition's end comes from the text that broke it off.
+            items[before:] = [item for item in items[before:] if item.code not in ("missing", "unclosed")]
+        first_at = {item.span.start: item for item in reversed(items[before:])}
+        items[before:] = sorted(first_at.values(), key=lambda item: item.span.start)[:MAX_MESSAGES]
         for child in hoisted:
             if self.is_sibling(child):
                 self.definition(child if child.type == "block" else self.block_of_entry(child))
@@ -133,21 +147,29 @@ class _FileReader:
         only follow from it: later ones, and braces that the broken text may have swallowed."""
         items = self.reading.diagnostics.items
         found = mistakes.first_error(self.reading, node, end)
-        if found is None or (found.is_gap and any(item.span.start == found.diagnostic.span.start for item in items)):
+        if found is None:
             return
+        items[before:] = [item for item in items[before:] if item.span.start != found.diagnostic.span.start]
         place = found.diagnostic.span
+        line = place.start_position.line
         kept = [item for item in items[before:] if item.span.start < place.start]
-        if not found.is_gap:
-            kept = [item for item in kept if item.code != "unclosed" or item.span.text != "{"]
-            self.broken = node
-        if not any(item.span.start_position.line == place.start_position.line for item in kept):
-            kept.append(found.diagnostic)
+        if found.is_gap:
+            later = [item for item in items[before:] if item.span.start_position.line > line]
+            items[before:] = [*kept, found.diagnostic, *later]
+            return
+        self.broken = node
+        kept = [item for item in kept if item.code != "unclosed" or item.span.text != "{"]
+        on_line = [item for item in kept if item.span.start_position.line == line]
+        if all(item.code == "missing" for item in on_line):
+            kept = [item for item in kept if item not in on_line] + [found.diagnostic]
         items[before:] = kept
 
     # --- scene blocks
 
     def include(self, node: Node) -> syntax.Include | None:
         path = string(self.reading, node.child_by_field_name("path"))
+        if path is None and not node.has_error:
+            self.reading.complain(node, "this #include names no file", 'write #include "forest.plsys"', "missing")
         return path and syntax.Include(self.reading.span(node), path)
 
     def declare(self, node: Node) -> syntax.Declare | None:
@@ -156,14 +178,17 @@ class _FileReader:
         if keyword.type == "#local":
             reading.complain(keyword, "#local isn't supported", "#declare does the same here", "unsupported")
         target = node.child_by_field_name("name")
-        if not any(child.type == "=" for child in node.children):
-            reading.complain(reading.after(target.end_byte), "missing '=' after the declared name",
-                             f"write #declare {reading.text(target)} = …", "missing")
+        if target is None:
+            self.name_of(node, "#declare Name = 1;")
+            return None
         items = self.items(node.children_by_field_name("value"), 0)
         if not items:
             reading.complain(node, f"#declare {reading.text(target)} has no value",
                              f"write #declare {reading.text(target)} = 1;", "missing")
             return None
+        if not any(child.type == "=" for child in node.children):
+            reading.complain(reading.after(target.end_byte), "missing '=' after the declared name",
+                             f"write #declare {reading.text(target)} = …", "missing")
         return syntax.Declare(reading.span(node), name(reading, target), items)
 
     def parameter(self, node: Node) -> syntax.ParameterDeclaration | None:

@@ -131,6 +131,8 @@ class _Body:
             return self.production(pieces, i, depth + 1)
         self.reading.complain(self.reading.after(guard.span.end), f"a rule is missing after this '{guard.kind}'",
                               RULE, "missing")
+        while guard.kind == "else" and i < len(pieces) and pieces[i].kind == "else":
+            i += 1
         return None, i
 
     # --- rules
@@ -245,7 +247,7 @@ class _Body:
         if not found:
             return (syntax.Alternative(self.reading.span(node), None, None),)
         unweighted = [each for each in found if each.weight is None]
-        if len(found) > 1 and unweighted:
+        if len(found) > 1 and unweighted and not node.has_error:
             self.reading.complain(unweighted[0].span, "this alternative has no weight", "write A -> 3: x | 1: y;")
         return tuple(found)
 
@@ -282,7 +284,10 @@ class _Body:
 
     def complain_stray(self, node: Node) -> None:
         text, following = self.reading.text(node), node.next_sibling
-        if text == "-" and (following is None or following.type != "stray"):
+        rest = self.reading.data[node.start_byte :].partition(b";")[0].partition(b"|")[0]
+        if b":" in rest and node.parent.start_byte == node.start_byte:
+            hint = "a weight is a number, a name or a call: A -> 3: x | f(n): y;"
+        elif text == "-" and (following is None or following.type != "stray"):
             hint = "only '+' joins what a rule produces"
         elif text[0].isdigit() or text[0] in ".<-":
             hint = "an operation with arguments stands in square brackets: [trans 0 0 1] Tree"
@@ -300,7 +305,10 @@ class _Body:
             return self.read_block(node, depth + 1)
         if node.type == "inline":
             reading.need_closer(node, "[", "]")
-            return syntax.Inline(reading.span(node), statements(reading, node.children, last_needs_semicolon=False))
+            found = statements(reading, node.children, last_needs_semicolon=False)
+            if not found and not node.has_error:
+                reading.complain(node, "these brackets hold nothing", "write an operation: [trans 0 0 1]")
+            return syntax.Inline(reading.span(node), found)
         if node.type == "group":
             reading.need_closer(node, "(", ")")
             unions = [child for child in node.children if child.type == "union"]

@@ -70,6 +70,9 @@ class Reading:
 
     def need_semicolon(self, node: Node, what: str) -> None:
         """Complain unless ``node`` ends with ';' (perhaps inside of a string or bracket that is never closed)."""
+        following = node.next_sibling
+        if following is not None and following.type in ("stray", "ERROR"):
+            return  # which is the mistake
         if self.data[node.end_byte - 1 : node.end_byte] != b";":
             self.missing_semicolon(node.end_byte, what)
 
@@ -195,15 +198,18 @@ def _vector(reading: Reading, node: Node, depth: int) -> syntax.Vector:
     if last.type != ">" or last.is_missing:
         reading.never_closed(node.start_byte, "<", ">")
     components = expressions(reading, node.named_children, depth)
-    if not 2 <= len(components) <= 5 and not node.has_error:
-        reading.complain(node, f"a vector has 2 to 5 components, this one has {len(components)}",
+    if len(components) not in (2, 3, 4, 5, 12) and not node.has_error:
+        reading.complain(node, f"a vector has 2 to 5 components, or a matrix's 12; this one has {len(components)}",
                          "write <x, y, z>; a comparison in it stands in brackets")
     return syntax.Vector(reading.span(node), components)
 
 
 def _parenthesized(reading: Reading, node: Node, depth: int) -> syntax.Expression | None:
     need_parenthesis(reading, node, node.children[0])
-    inside = node.named_children
+    inside = [child for child in node.named_children if child.type in _EXPRESSIONS]
+    if len(inside) > 1:
+        reading.complain(node.children[0], "a vector stands in angle brackets", "write <x, y, z>")
+        return syntax.Vector(reading.span(node), expressions(reading, inside, depth))
     return expression(reading, inside[0], depth + 1) if inside else None
 
 
