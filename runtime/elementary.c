@@ -122,7 +122,7 @@ static double join(pair a, int exponent) {
         exponent = -2000;
     int e;
     split(a.high, &e);
-    if (e + exponent >= -1021) {
+    if (e + exponent >= -1022) {
         double result = a.high + a.low;
         for (; exponent > 1023; exponent -= 1000)
             result *= 0x1p1000;
@@ -137,7 +137,7 @@ static double join(pair a, int exponent) {
     const pair sum = two_sum(anchor, a.high);
     const double rounded = (sum.high + (sum.low + a.low)) - anchor;
     const int half = exponent / 2;
-    return rounded * power_of_two(half) * power_of_two(exponent - half);
+    return copysign(rounded * power_of_two(half) * power_of_two(exponent - half), a.high);
 }
 
 /* --- circular functions --- */
