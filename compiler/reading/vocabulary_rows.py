@@ -645,7 +645,7 @@ ROWS: dict[str, dict] = {'keyword.Selection': {'signature': 'Selection Name(a, b
                                   'type': 'number',
                                   'unit': 'degrees',
                                   'range': '[-180, 180]',
-                                  'default': 70,
+                                  'default': 30,
                                   'doc': "Half the angle of a spotlight's fully lit cone.",
                                   'example': 'light_source { <0, 10, 0> color White spotlight radius 12 }',
                                   'povray': 'radius'},
@@ -653,7 +653,7 @@ ROWS: dict[str, dict] = {'keyword.Selection': {'signature': 'Selection Name(a, b
                                    'type': 'number',
                                    'unit': 'degrees',
                                    'range': '[-180, 180]',
-                                   'default': 70,
+                                   'default': 45,
                                    'doc': 'Half the angle at which a spotlight has faded to nothing.',
                                    'example': 'light_source { <0, 10, 0> color White spotlight radius 12 '
                                               'falloff 15 }',

@@ -1,0 +1,43 @@
+/* vector.h - three doubles: dot and cross products, unit vectors. All sums in one fixed order (see affine.h). */
+#ifndef PL_VECTOR_H
+#define PL_VECTOR_H
+
+#include <math.h>
+#include <stdbool.h>
+
+static inline double pl_dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* out may be neither a nor b. */
+static inline void pl_cross(const double a[3], const double b[3], double out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* Divides v by its length, which is returned: also where the squares would leave the range of doubles. A vector that
+ * has no direction (zero, or not finite) stays as it is, and the result is 0. */
+static inline double pl_normalize(double v[3])
+{
+    double square = pl_dot(v, v), scale = 1.0;
+    if (!(square > 1e-250 && square < 1e250)) {
+        scale = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+        if (!(scale > 0.0 && scale < INFINITY)) return 0.0;
+        const double scaled[3] = {v[0] / scale, v[1] / scale, v[2] / scale};
+        square = pl_dot(scaled, scaled);
+        if (!(square > 0.0 && square < INFINITY)) return 0.0;
+    }
+    const double length = sqrt(square);
+    for (int axis = 0; axis < 3; axis++) v[axis] = v[axis] / scale / length;
+    return length * scale;
+}
+
+static inline bool pl_finite(const double v[3])
+{
+    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
+}
+
+#endif
