@@ -56,6 +56,11 @@ class Instances:
     def __len__(self) -> int:
         return len(self.kind)
 
+    @property
+    def kinds(self) -> list[str]:
+        """The shapes' names."""
+        return [SHAPE_NAMES[kind] for kind in self.kind.tolist()]
+
     def take(self, rows) -> Instances:
         return Instances(*(getattr(self, f.name)[rows] for f in fields(self)))
 
