@@ -13,8 +13,8 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # Headers of the runtime by layer, lowest first. A file may include headers of its own layer and of those below.
 LAYERS = [
-    ["include/plsys.h", "bytecode.h", "affine.h", "random.h", "elementary.h", "error.h", "box.h", "reader.h"],
-    ["program.h", "expression.h"],
+    ["include/plsys.h", "bytecode.h", "affine.h", "random.h", "elementary.h", "error.h", "box.h", "table.h"],
+    ["program.h", "reader.h", "expression.h"],
     ["shapes/*.h"],
     ["derive.h", "state.h"],
     ["accel/*.h"],
