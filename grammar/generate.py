@@ -60,13 +60,14 @@ def python_rows(table: dict) -> str:
     def literal(value) -> str:
         return pprint.pformat(value, width=110, sort_dicts=False)
 
+    colours = {name: [float(part) for part in parts] for name, parts in table["colour"].items()}
     unsupported = {name: group["hint"] for group in table["unsupported"] for name in group["names"]}
     return "\n".join((
         '"""The vocabulary\'s rows; generated from grammar/vocabulary.toml by grammar/generate.py, not edited."""',
         "",
         f"ROWS: dict[str, dict] = {literal(flat_rows(table))}",
         "",
-        f"COLOURS: dict[str, list[float]] = {literal(table['colour'])}",
+        f"COLOURS: dict[str, list[float]] = {literal(colours)}",
         "",
         f"UNSUPPORTED: dict[str, str] = {literal(unsupported)}",
         "",

@@ -12,7 +12,7 @@ Example::
 from __future__ import annotations
 
 import math
-from typing import Callable, Sequence
+from typing import Sequence
 
 from .model import Apply, Constant, Expression
 from .source import Span
@@ -26,65 +26,23 @@ class NotFinite(Exception):
         self.reason, self.span = reason, span
 
 
-def _sign(a: float) -> float:
-    return float((a > 0) - (a < 0))
-
-
-def _round(a: float) -> float:
-    # a + 0.5 would round 0.49999999999999994 up, so the halves are told apart by the exact fraction.
-    whole = math.floor(abs(a))
-    return math.copysign(whole + (abs(a) - whole >= 0.5), a)
-
-
-_EXACT: dict[str, Callable[..., float]] = {
-    "add": lambda a, b: a + b,
-    "subtract": lambda a, b: a - b,
-    "multiply": lambda a, b: a * b,
-    "divide": lambda a, b: a / b,
-    "modulo": math.fmod,
-    "negate": lambda a: -a,
-    "not": lambda a: float(a == 0),
-    "less": lambda a, b: float(a < b),
-    "less_equal": lambda a, b: float(a <= b),
-    "greater": lambda a, b: float(a > b),
-    "greater_equal": lambda a, b: float(a >= b),
-    "equal": lambda a, b: float(a == b),
-    "not_equal": lambda a, b: float(a != b),
-    "abs": abs,
-    "sign": _sign,
-    "floor": lambda a: float(math.floor(a)),
-    "ceil": lambda a: float(math.ceil(a)),
-    "round": _round,
-    "min": lambda a, b: a if a < b else b,
-    "max": lambda a, b: a if a > b else b,
-    "clamp": lambda a, low, high: _EXACT["min"](_EXACT["max"](a, low), high),
-    "mix": lambda a, b, t: a * (1 - t) + b * t,
-    "sqrt": math.sqrt,
-    "and": lambda a, b: float(a != 0 and b != 0),
-    "or": lambda a, b: float(a != 0 or b != 0),
-    "select": lambda test, then, otherwise: then if test != 0 else otherwise,
-}  # fmt: skip
-
-_ELEMENTARY = frozenset(("pow", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan2"))
-
-
 def apply(operation: str, values: Sequence[float], seed: float = 0.0) -> float:
-    """The value of one operation on finite numbers; angles in degrees. ``seed`` is the scene's, for ``hash``.
-    Raises NotFinite; ``rand`` has no constant value and is a KeyError."""
+    """The value of one opcode, or of and/or/select, for finite numbers; angles in degrees. ``seed`` is the scene's,
+    for ``hash``. Raises NotFinite; ``rand`` has no constant value and is a KeyError."""
+    if operation == "and":
+        return float(values[0] != 0 and values[1] != 0)
+    if operation == "or":
+        return float(values[0] != 0 or values[1] != 0)
+    if operation == "select":
+        return values[1] if values[0] != 0 else values[2]
     if operation in ("divide", "modulo") and values[1] == 0:
         raise NotFinite("division by zero" if operation == "divide" else "remainder of a division by zero")
-    try:
-        if operation in _ELEMENTARY or operation == "hash":
-            from .. import elementary
+    from .. import elementary
 
-            if operation == "hash":
-                result = elementary.hash(elementary.seed_key(seed), *values)
-            else:
-                result = getattr(elementary, operation)(*values)
-        else:
-            result = _EXACT[operation](*values)
-    except (ValueError, OverflowError):
-        result = math.nan
+    if operation == "hash":
+        result = elementary.hash(elementary.seed_key(seed), *values)
+    else:
+        result = elementary.apply(operation, *values)
     if not math.isfinite(result):
         shown = ", ".join(f"{value:g}" for value in values)
         raise NotFinite(f"{operation}({shown}) is {'not a number' if math.isnan(result) else 'infinite'}")

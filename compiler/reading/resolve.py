@@ -19,7 +19,7 @@ from typing import Callable
 
 from . import meshes, syntax
 from .diagnostics import Diagnostics, nearest
-from .model import Input, Mesh, Model, Record, SceneObject
+from .model import Constant, Input, Mesh, Model, Record, SceneObject
 from .resolve_blocks import Blocks, Values
 from .resolve_expressions import BLOCKS, INPUTS, Expressions, Value
 from .resolve_items import Items
@@ -89,6 +89,8 @@ class _Resolver:
             self.reporting(lambda: self.block(block))
         for entry in list(entries.values()):
             self.reporting(lambda: self.force(entry))
+        if self.settings:
+            model.settings = Record("settings", tuple(self.settings.items()))
         return model
 
     def reporting(self, work: Callable[[], object]) -> None:
@@ -178,13 +180,7 @@ class _Resolver:
                 raise Problem("wrong-value", span, message)
         text = node.text.value if node.text is not None else ""
         self.model.inputs.append(Input(name, value, default, low, high, text, node.span))
-        return Value("number", (self._constant(value, node.span),), node.span)
-
-    @staticmethod
-    def _constant(value: float, span: Span):
-        from .model import Constant
-
-        return Constant(value, span)
+        return Value("number", (Constant(value, node.span),), node.span)
 
     # --- blocks
 
@@ -204,10 +200,6 @@ class _Resolver:
             self.place(block)
         else:
             raise self._unknown_block(block)
-        self._keep_settings()
-
-    def _keep_settings(self) -> None:
-        self.model.settings = Record("settings", tuple(self.settings.items()))
 
     def once(self, block: syntax.Block, again: bool) -> None:
         if again:

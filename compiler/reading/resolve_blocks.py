@@ -12,7 +12,7 @@ from . import affine, syntax
 from .diagnostics import Note
 from .model import Constant, Record
 from .resolve_expressions import BLOCKS, Expressions
-from .resolve_items import Items, check_range
+from .resolve_items import Items
 from .resolve_names import Names, Problem
 from .resolve_textures import TRANSFORMATIONS, Textures
 from .source import Span
@@ -57,13 +57,11 @@ class Blocks:
                 row = rows.get(items.word())
                 if row is None:
                     raise items.misfit(list(rows))
-                name = items.take()
+                items.take()
                 if row.name == "assumed_gamma":
                     self._gamma(items)
                 else:
                     values[row.name] = self._property(row, items)
-                    if name.span.text and row.name == "seed" and values[row.name][0] == 0:
-                        values[row.name] = (0.0,)
             except Problem as problem:
                 self._report(items, problem)
 
@@ -90,10 +88,8 @@ class Blocks:
             try:
                 word = items.word()
                 if word in TRANSFORMATIONS:
-                    item = items.peek()
-                    raise_later = Problem("unsupported", item.span, "the camera can't be transformed", "set location and look_at")
-                    items.take()
-                    raise raise_later
+                    span = items.take().span
+                    raise Problem("unsupported", span, "the camera can't be transformed", "set location and look_at")
                 row = rows.get(word)
                 if row is None:
                     raise items.misfit(list(rows))
@@ -142,7 +138,7 @@ class Blocks:
                 # The point that the light aims at moves too, the default one as well.
                 aim = values.get("point_at", tuple(row_default(rows["point_at"])))
                 values["point_at"] = affine.transform_point(matrix, aim)
-            elif row is not None and word not in ("color",):
+            elif row is not None and word != "color":
                 items.take()
                 values[word] = self._property(row, items)
             elif items.starts_colour():
@@ -169,5 +165,3 @@ def rgb(items: Items, what: str) -> tuple[float, ...]:
         raise Problem("wrong-kind", value.span, f"{what} must be constant")
     return value.numbers()[:3]
 
-
-__all__ = ["Blocks", "check_range", "rgb"]

@@ -131,7 +131,12 @@ class Expressions:
             if name in AXES and scope.block:
                 return Value("vector", tuple(Constant(part, span) for part in AXES[name]), span)
         kinds = ("parameter", "value", "input") + (("constant", "colour") if scope.block else ("constant",))
-        entry = self.names.find(node, kinds, "a value" if scope.block else "a number")
+        try:
+            entry = self.names.find(node, kinds, "a value" if scope.block else "a number")
+        except Problem as problem:
+            if problem.code == "unknown-name" and scope.reads and not problem.hint:
+                problem.hint = f"nothing assigns it: write Calculation C {{ {name} = 1; }}, or Parameter {name} = 1;"
+            raise
         if entry.kind != "parameter":
             value = self.constant_of(entry, span)
             return Value(value.kind, tuple(Constant(number, span) for number in value.numbers()), span)

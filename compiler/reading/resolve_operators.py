@@ -6,13 +6,11 @@ Example: ``{ --cntTree; betaBr -= 4.0; }`` becomes one Calculate with two Assign
 
 from __future__ import annotations
 
-from typing import Sequence
-
 from . import syntax, vocabulary
+from .diagnostics import nearest
 from .model import Apply, Assign, Calculate, Constant, Expression, Operator, Read, Step, Transform, Variants
 from .resolve_expressions import RULES, Expressions
 from .resolve_names import ARTICLES, Entry, Names, Problem
-from .source import Span
 
 UPDATES = {"+=": "add", "-=": "subtract", "*=": "multiply", "/=": "divide", "++": "add", "--": "subtract"}
 
@@ -133,14 +131,8 @@ class Operators:
             message = f"'{name.name}' is {ARTICLES[entry.kind]}, not an operation"
             hint = f"to assign it, write {name.name} = …" if entry.kind == "parameter" else ""
             return Problem("wrong-kind", name.span, message, hint)
-        from .diagnostics import nearest
-
         problem = self.names.unknown(name, (), "an operation")
         problem.hint = problem.hint or nearest(name.name, vocabulary.OPERATIONS)
         problem.hint = problem.hint or f"operations are {' '.join(vocabulary.OPERATIONS)}"
         return problem
 
-
-def check_span(nodes: Sequence[syntax.Node]) -> Span:
-    """The span of nodes that stand side by side."""
-    return nodes[0].span.to(nodes[-1].span)

@@ -33,7 +33,6 @@ from .model import (
     Read,
     Sum,
     Symbol,
-    Variants,
 )
 from .resolve_expressions import RULES, Expressions, Scope
 from .resolve_names import Entry, Names, Problem, terms_of

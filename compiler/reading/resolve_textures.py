@@ -12,7 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Sequence
 
-from . import affine, syntax
+from . import affine, syntax, vocabulary
+from .diagnostics import nearest
 from .model import Apply, Constant, Expression, Paint, Read, Step, TextureValue
 from .resolve_expressions import BLOCKS, TEXTURES, Expressions, Scope, Value
 from .resolve_items import Items, check_range
@@ -27,11 +28,11 @@ ColourEntry = tuple[Expression, ...]  # position, red, green, blue, filter, tran
 
 
 def entry_of(position: float, parts: Sequence[Expression]) -> ColourEntry:
-    return (Constant(position), *parts)
+    return (Constant(float(position)), *parts)
 
 
 def constant_entry(position: float, red: float, green: float, blue: float) -> ColourEntry:
-    return tuple(Constant(value) for value in (position, red, green, blue, 0.0, 0.0))
+    return tuple(Constant(float(value)) for value in (position, red, green, blue, 0, 0))
 
 
 # POV-Ray 3.7's defaults: black without a pigment, blue and green checkers, a gradient of greys.
@@ -248,23 +249,15 @@ class Textures:
     def _misfit(self, items: Items, kind: str, rows: list[str]) -> Problem:
         """The next item fits nothing in a block of this ``kind``: perhaps a name that isn't defined."""
         item = items.peek()
-        if isinstance(item, syntax.Name) and items.at == 0 and item.name not in MODIFIERS:
-            entry = self.names.entries.get(item.name)
-            if entry is not None or not Items("", item.span, (item,), self.expressions, items.scope).word() in rows:
-                return self._unknown(item, kind, rows)
-        return items.misfit(rows)
-
-    def _unknown(self, name: syntax.Name, kind: str, rows: list[str]) -> Problem:
+        if not isinstance(item, syntax.Name) or items.at > 0 or item.name in MODIFIERS or vocabulary.kind_of(item.name):
+            return items.misfit(rows)
         try:
-            self.names.find(name, (kind,), f"a {kind}")
+            self.names.find(item, (kind,), f"a {kind}")
         except Problem as problem:
             if problem.code == "unknown-name":
-                from .diagnostics import nearest
-
-                kinds = [other for other, entry in self.names.entries.items() if entry.kind == kind]
-                problem.hint = nearest(name.name, [*rows, *kinds]) or problem.hint
+                problem.hint = nearest(item.name, rows) or problem.hint
             return problem
-        return Problem()
+        return items.misfit(rows)
 
     # --- transformations
 

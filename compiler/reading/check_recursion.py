@@ -1,0 +1,160 @@
+"""Recursions that can't end, or end by luck only.
+
+On the graph of symbols (guards ignored unless they are decided): a symbol *ends* if one of its ways leads only to
+symbols that end. What doesn't end is an error. Of what may end, cycles are looked at whose guards read nothing
+that changes on the way round, and cycles that only a draw leaves.
+
+Example: ``Selection A { A -> box + [ trans 0 0 1 ] A; }`` never ends; with ``if (n > 0)`` and no ``--n``, it ends
+at once or never.
+"""
+
+from __future__ import annotations
+
+from .diagnostics import Diagnostics
+from .model import Assign, Branch, Calculate, Choose, Constant, Enter, Model, Operand, Produce, Production, Symbol
+from .walk import Way, decided, draws, is_open, leaves, reached_symbols, reads, seed_of, ways
+
+
+def check_recursion(model: Model, diagnostics: Diagnostics) -> None:
+    """Report on the recursions that the scene's objects lead to."""
+    seed, names = seed_of(model), reached_symbols(model)
+    reached = {name: symbol for name, symbol in model.symbols.items() if name in names}
+    endless = _endless(reached, seed)
+    for component in components({name: entered(symbol) for name, symbol in reached.items()}):
+        members = [reached[name] for name in reached if name in component]
+        if not _is_cycle(members):
+            continue
+        if component & endless:
+            if not may_be_endless(model, component):
+                _report_endless(members[0], members, diagnostics)
+        else:
+            _check_cycle(members, component, seed, diagnostics)
+
+
+def may_be_endless(model: Model, component: frozenset[str]) -> bool:
+    """Whether an endless recursion through the symbols of ``component`` is legal: it is iff every cycle contracts,
+    because then a detail cut-off ends it. No back end has that cut-off, so none is legal."""
+    return False
+
+
+def _report_endless(symbol: Symbol, members: list[Symbol], diagnostics: Diagnostics) -> None:
+    others = ", ".join(f"'{other.name}'" for other in members[1:])
+    through = f" (through {others})" if others else ""
+    message = f"'{symbol.name}' never ends: each of its rules leads back to it{through}"
+    hint = f"count down: if (n > 0) {symbol.name} -> … [ --n ] {symbol.name}; and a rule for the end"
+    diagnostics.add("endless", symbol.name_span, message, hint)
+
+
+def entered(symbol: Symbol) -> set[str]:
+    return {way.leaf.symbol for way in ways(symbol.production) if isinstance(way.leaf, Enter)}
+
+
+def _is_cycle(members: list[Symbol]) -> bool:
+    return len(members) > 1 or members[0].name in entered(members[0])
+
+
+def _endless(symbols: dict[str, Symbol], seed: float) -> set[str]:
+    """The symbols none of whose derivations is finite: the complement of a least fixpoint."""
+    ending: set[str] = set()
+    changed = True
+    while changed:
+        changed = False
+        for name, symbol in symbols.items():
+            if name not in ending and _ends(symbol.production, ending, seed):
+                ending.add(name)
+                changed = True
+    return set(symbols) - ending
+
+
+def _ends(production: Production, ending: set[str], seed: float) -> bool:
+    if isinstance(production, Branch):
+        truth = decided(production.test, seed)
+        then = truth is not False and _ends(production.then, ending, seed)
+        return then or (truth is not True and _ends(production.otherwise, ending, seed))
+    if isinstance(production, Choose):
+        return any(
+            _ends(produce, ending, seed)
+            for weight, produce in production.cases
+            if not (isinstance(weight, Constant) and weight.value == 0)
+        )
+    body: Operand = production.body if isinstance(production, Produce) else production
+    return all(leaf.symbol in ending for _, leaf in leaves(body) if isinstance(leaf, Enter))
+
+
+def _check_cycle(members: list[Symbol], component: frozenset[str], seed: float, diagnostics: Diagnostics) -> None:
+    """A cycle that can be left: does something change on the way round that its guards look at?"""
+    back: list[tuple[Symbol, Way]] = []
+    for symbol in members:
+        for way in ways(symbol.production):
+            if isinstance(way.leaf, Enter) and way.leaf.symbol in component and is_open(way, seed):
+                back.append((symbol, way))
+    drawing = [(symbol, way) for symbol, way in back if way.weights or any(draws(test) for test, _ in way.guards)]
+    guards = {name for symbol in members for way in ways(symbol.production) for test, _ in way.guards for name in reads(test)}
+    changed = {name for _, way in back for name in _assigned(way)}
+    if drawing and not guards & changed:
+        symbol, way = drawing[0]
+        span = way.leaf.span or symbol.name_span
+        message = f"this recursion of '{symbol.name}' ends with some probability only"
+        diagnostics.add("random-loop", span, message, "the number of its rounds has no limit; a counter would give one")
+        return
+    for symbol, way in back:
+        if len(members) == 1 and not way.operators and not _draws_before(way):
+            span = way.leaf.span or symbol.name_span
+            message = f"'{symbol.name}' leads back to itself with nothing changed: this never ends"
+            diagnostics.add("identity-cycle", span, message, f"put an operator before it: [ --n; trans 0 0 1 ] {symbol.name}")
+            return
+    if guards and not guards & changed and not drawing:
+        symbol, way = back[0]
+        span = way.leaf.span or symbol.name_span
+        named = ", ".join(f"'{name}'" for name in sorted(guards))
+        message = f"the guards read {named}, which this recursion of '{symbol.name}' never changes"
+        diagnostics.add("counter", span, message, f"change it on the way: [ --{sorted(guards)[0]} ] {symbol.name}")
+
+
+def _draws_before(way: Way) -> bool:
+    return bool(way.weights) or any(draws(test) for test, _ in way.guards)
+
+
+def _assigned(way: Way) -> set[str]:
+    return {
+        statement.parameter
+        for operator in way.operators
+        if isinstance(operator, Calculate)
+        for statement in operator.statements
+        if isinstance(statement, Assign)
+    }
+
+
+def components(edges: dict[str, set[str]]) -> list[frozenset[str]]:
+    """The strongly connected components (Tarjan 1972), without recursion so that long chains are fine."""
+    order: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found: list[frozenset[str]] = []
+    for root in edges:
+        if root in order:
+            continue
+        work = [(root, iter(sorted(edges[root])))]
+        order[root] = low[root] = len(order)
+        stack.append(root)
+        while work:
+            name, successors = work[-1]
+            for other in successors:
+                if other not in edges:
+                    continue
+                if other not in order:
+                    order[other] = low[other] = len(order)
+                    stack.append(other)
+                    work.append((other, iter(sorted(edges[other]))))
+                    break
+                if other in stack:
+                    low[name] = min(low[name], order[other])
+            else:
+                work.pop()
+                if work:
+                    low[work[-1][0]] = min(low[work[-1][0]], low[name])
+                if low[name] == order[name]:
+                    at = stack.index(name)
+                    found.append(frozenset(stack[at:]))
+                    del stack[at:]
+    return found

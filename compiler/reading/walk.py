@@ -1,0 +1,193 @@
+"""Walks over the model: what productions lead where, under which guards, and which expressions stand in them.
+
+Example::
+
+    for way in ways(model.symbols["Tree"].production):
+        way.guards, way.operators, way.leaf       # ((Apply('greater', …), True),), (Calculate, …), Enter('Tree')
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Iterator
+
+from .evaluate import NotFinite, fold
+from .model import (
+    Apply,
+    Assign,
+    Branch,
+    Calculate,
+    Choose,
+    Constant,
+    Enter,
+    Expression,
+    Model,
+    Operand,
+    Operator,
+    Paint,
+    Prefixed,
+    Primitive,
+    Produce,
+    Production,
+    Read,
+    Step,
+    Sum,
+    Transform,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """One way through a production to a leaf (Enter, Primitive, MeshLeaf, Empty). ``guards`` are the tests on it
+    with the outcome it needs, ``weights`` the weights of the alternatives it takes."""
+
+    guards: tuple[tuple[Expression, bool], ...]
+    weights: tuple[Expression, ...]
+    operators: tuple[Operator, ...]
+    leaf: Operand
+    is_rule: bool  # not where no rule applies
+
+
+def ways(production: Production, guards: tuple = (), weights: tuple = ()) -> Iterator[Way]:
+    if isinstance(production, Branch):
+        yield from ways(production.then, (*guards, (production.test, True)), weights)
+        yield from ways(production.otherwise, (*guards, (production.test, False)), weights)
+    elif isinstance(production, Choose):
+        for weight, produce in production.cases:
+            yield from ways(produce, guards, (*weights, weight))
+    else:
+        body = production.body if isinstance(production, Produce) else production
+        for operators, leaf in leaves(body):
+            yield Way(guards, weights, operators, leaf, isinstance(production, Produce))
+
+
+def leaves(operand: Operand, operators: tuple[Operator, ...] = ()) -> Iterator[tuple[tuple[Operator, ...], Operand]]:
+    """The leaves of an operand, each with the operators on its way, outermost first."""
+    while isinstance(operand, Prefixed):
+        operators = (*operators, operand.operator)
+        operand = operand.operand
+    if isinstance(operand, Sum):
+        for term in operand.terms:
+            yield from leaves(term, operators)
+    else:
+        yield operators, operand
+
+
+def parts(expression: Expression) -> Iterator[Expression]:
+    """``expression`` and all that it is made of."""
+    yield expression
+    if isinstance(expression, Apply):
+        for argument in expression.arguments:
+            yield from parts(argument)
+
+
+def reads(expression: Expression) -> frozenset[str]:
+    return frozenset(part.parameter for part in parts(expression) if isinstance(part, Read))
+
+
+def draws(expression: Expression) -> bool:
+    return any(isinstance(part, Apply) and part.operation == "rand" for part in parts(expression))
+
+
+def expressions_of(operator: Operator) -> Iterator[Expression]:
+    """The expressions of an operator, in order of evaluation."""
+    if isinstance(operator, Calculate):
+        for statement in operator.statements:
+            yield statement.value if isinstance(statement, Assign) else statement.count
+    elif isinstance(operator, Transform):
+        for step in operator.steps:
+            yield from step.arguments
+    elif isinstance(operator, Paint):
+        for _, values in operator.texture.values:
+            yield from values
+        for entry in operator.texture.entries:
+            yield from entry
+
+
+def operators_of(model: Model) -> Iterator[Operator]:
+    """Every operator of the scene, each once."""
+    seen: set[int] = set()
+    for way in all_ways(model):
+        for operator in way.operators:
+            if id(operator) not in seen:
+                seen.add(id(operator))
+                yield operator
+
+
+def all_ways(model: Model) -> Iterator[Way]:
+    for placed in model.objects:
+        yield from ways(placed.body)  # type: ignore[arg-type]
+    for symbol in model.symbols.values():
+        yield from ways(symbol.production)
+
+
+def steps_of(model: Model) -> Iterator[Step]:
+    for operator in operators_of(model):
+        if isinstance(operator, Transform):
+            yield from operator.steps
+
+
+def all_expressions(model: Model) -> Iterator[Expression]:
+    """Every whole expression of the scene, each once."""
+    seen: set[int] = set()
+
+    def fresh(expression: Expression) -> bool:
+        new = id(expression) not in seen
+        seen.add(id(expression))
+        return new
+
+    for operator in operators_of(model):
+        yield from filter(fresh, expressions_of(operator))
+    for way in all_ways(model):
+        yield from filter(fresh, (test for test, _ in way.guards))
+        yield from filter(fresh, way.weights)
+        if isinstance(way.leaf, Primitive):
+            yield from filter(fresh, way.leaf.arguments)
+
+
+def reached_symbols(model: Model) -> set[str]:
+    """The symbols that the scene's objects lead to, guards ignored."""
+    found: set[str] = set()
+    waiting = [way.leaf for placed in model.objects for way in ways(placed.body)]  # type: ignore[arg-type]
+    while waiting:
+        leaf = waiting.pop()
+        if isinstance(leaf, Enter) and leaf.symbol not in found and leaf.symbol in model.symbols:
+            found.add(leaf.symbol)
+            waiting += [way.leaf for way in ways(model.symbols[leaf.symbol].production)]
+    return found
+
+
+def decided(test: Expression, seed: float) -> bool | None:
+    """Whether a guard is always true or always false, where that can be told: constants, and draws (which are in
+    [0, 1)) compared with a constant outside of their range."""
+    try:
+        folded = fold(test, seed)
+    except NotFinite:
+        return None
+    if isinstance(folded, Constant):
+        return folded.value != 0
+    if isinstance(folded, Apply) and len(folded.arguments) == 2:
+        draw, bound = folded.arguments
+        if isinstance(draw, Apply) and draw.operation == "rand" and isinstance(bound, Constant):
+            above, below = bound.value >= 1, bound.value < 0
+            if folded.operation in ("less", "less_equal") and (above or below):
+                return above
+            if folded.operation in ("greater", "greater_equal") and (above or below):
+                return below
+            if folded.operation == "less" and bound.value == 0:
+                return False
+            if folded.operation == "greater_equal" and bound.value == 0:
+                return True
+    return None
+
+
+def is_open(way: Way, seed: float) -> bool:
+    """Whether no guard and no weight on the way rules it out for certain."""
+    if any(decided(test, seed) is (not needed) for test, needed in way.guards):
+        return False
+    return not any(isinstance(weight, Constant) and weight.value == 0 for weight in way.weights)
+
+
+def seed_of(model: Model) -> float:
+    """The scene's seed."""
+    return dict(model.settings.values).get("seed", (0.0,))[0] if model.settings is not None else 0.0
