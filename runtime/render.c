@@ -1,0 +1,202 @@
+/* render.c - see render.h. */
+#include "render.h"
+
+#include <limits.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <time.h>
+
+#include "antialias.h"
+#include "error.h"
+
+/* One rendering, shared by its threads. */
+typedef struct pl_job {
+    const pl_render_options *options;
+    const pl_channels *channels;
+    bool wants_first; /* a channel besides colour is wanted */
+    uint32_t columns, tiles;
+    atomic_uint next, finished;
+    atomic_uint failed; /* the first tile that failed so far; UINT_MAX: none */
+    atomic_bool cancelled;
+    pthread_mutex_t lock; /* of error */
+    pl_error error;       /* of tile `failed` */
+} pl_job;
+
+typedef struct pl_worker {
+    pl_job *job;
+    pl_shader *shader;
+    pl_sampler *sampler;
+    pthread_t thread;
+    bool reports; /* this one calls the progress function */
+    bool started;
+} pl_worker;
+
+static void set_vector(float *channel, size_t pixel, const double *value)
+{
+    for (int i = 0; channel && i < 3; i++) channel[3 * pixel + i] = value ? (float)value[i] : 0.0f;
+}
+
+static void set_index(int32_t *channel, size_t pixel, uint64_t value)
+{
+    if (channel) channel[pixel] = value > INT32_MAX ? INT32_MAX : (int32_t)value;
+}
+
+static void write_first(const pl_channels *channels, size_t pixel, const pl_first *first)
+{
+    const bool found = first->t != INFINITY;
+    const pl_surface *surface = &first->surface;
+    if (channels->depth) channels->depth[pixel] = (float)first->t;
+    set_vector(channels->normal, pixel, found ? surface->normal : NULL);
+    set_vector(channels->position, pixel, found ? surface->point : NULL);
+    if (channels->primitive)
+        channels->primitive[pixel] = !found ? -1 : first->primitive > INT64_MAX ? INT64_MAX : (int64_t)first->primitive;
+    if (channels->symbol) channels->symbol[pixel] = found ? surface->symbol : -1;
+    if (channels->rule) channels->rule[pixel] = found ? surface->rule : -1;
+    if (channels->recursion) channels->recursion[pixel] = found ? surface->depth : 0;
+    set_index(channels->boxes, pixel, first->box_tests);
+    set_index(channels->miss_depth, pixel, first->miss_depth);
+}
+
+/* Keeps the error of the first tile in order, whichever thread is first in time. */
+static void fail(pl_job *job, uint32_t tile, const pl_error *error)
+{
+    pthread_mutex_lock(&job->lock);
+    if (tile < atomic_load(&job->failed)) {
+        job->error = *error;
+        atomic_store(&job->failed, tile);
+    }
+    pthread_mutex_unlock(&job->lock);
+}
+
+/* A tile's result is of no use: the rendering is cancelled or an earlier tile failed. */
+static bool is_idle(pl_job *job, uint32_t tile)
+{
+    return atomic_load_explicit(&job->cancelled, memory_order_relaxed) ||
+           atomic_load_explicit(&job->failed, memory_order_relaxed) < tile;
+}
+
+static bool render_tile(pl_worker *worker, uint32_t tile, pl_error *error)
+{
+    pl_job *job = worker->job;
+    const int width = job->options->width, height = job->options->height;
+    const int left = (int)(tile % job->columns) * PL_TILE, top = (int)(tile / job->columns) * PL_TILE;
+    pl_sampler_begin_tile(worker->sampler, left, top);
+    for (int y = top; y < height && y < top + PL_TILE; y++)
+        for (int x = left; x < width && x < left + PL_TILE; x++) {
+            const size_t pixel = (size_t)y * (size_t)width + (size_t)x;
+            double color[3];
+            pl_first first;
+            if (is_idle(job, tile)) return true;
+            if (!pl_sampler_pixel(worker->sampler, x, y, color, job->wants_first ? &first : NULL, error)) return false;
+            set_vector(job->channels->color, pixel, color);
+            if (job->wants_first) write_first(job->channels, pixel, &first);
+        }
+    return true;
+}
+
+static void *work(void *context)
+{
+    pl_worker *worker = context;
+    pl_job *job = worker->job;
+    const pl_render_options *options = job->options;
+    for (;;) {
+        const uint32_t tile = atomic_fetch_add(&job->next, 1);
+        pl_error error = {.code = PL_OK};
+        if (tile >= job->tiles || is_idle(job, tile)) return NULL;
+        if (!render_tile(worker, tile, &error)) fail(job, tile, &error);
+        const uint32_t finished = atomic_fetch_add(&job->finished, 1) + 1;
+        if (worker->reports && options->progress && !options->progress(options->context, (double)finished / job->tiles))
+            atomic_store(&job->cancelled, true);
+    }
+}
+
+static bool check(const pl_scene *scene, const pl_render_options *options, const pl_channels *channels, pl_error *error)
+{
+    if (!scene || !options || !channels)
+        return pl_fail(error, PL_ERROR_ARGUMENT, "pl_render", "scene, options or channels are missing");
+    if (options->width < 1 || options->height < 1 || options->width > PL_LIMIT_SIDE || options->height > PL_LIMIT_SIDE)
+        return pl_fail(error, PL_ERROR_ARGUMENT, "size", "a picture of %d x %d pixels, not 1 to %d a side",
+                       options->width, options->height, PL_LIMIT_SIDE);
+    return pl_sampler_check(options, error);
+}
+
+static bool prepare(pl_worker *workers, int count, pl_job *job, const pl_view *view, pl_error *error)
+{
+    for (int i = 0; i < count; i++) {
+        workers[i].job = job;
+        workers[i].reports = i == 0;
+        workers[i].shader = pl_shader_create(view, error);
+        if (!workers[i].shader) return false;
+        workers[i].sampler = pl_sampler_create(workers[i].shader, job->options, error);
+        if (!workers[i].sampler) return false;
+    }
+    return true;
+}
+
+/* All workers to the end. A thread that can't be started leaves its tiles to the others. */
+static void run(pl_worker *workers, int count)
+{
+    for (int i = 1; i < count; i++)
+        workers[i].started = pthread_create(&workers[i].thread, NULL, work, &workers[i]) == 0;
+    work(&workers[0]);
+    for (int i = 1; i < count; i++)
+        if (workers[i].started) pthread_join(workers[i].thread, NULL);
+}
+
+static double seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static bool render(pl_scene *scene, pl_job *job, const pl_view *view, pl_error *error)
+{
+    const double start = seconds();
+    int count = pl_scene_threads(scene);
+    if ((uint32_t)count > job->tiles) count = (int)job->tiles;
+    pl_worker *workers = calloc((size_t)count, sizeof *workers);
+    if (!workers) return pl_fail_memory(error, "preparing to render");
+    bool ok = prepare(workers, count, job, view, error);
+    if (ok) run(workers, count);
+    for (int i = 0; i < count; i++) {
+        if (workers[i].shader) pl_shader_count(workers[i].shader, scene);
+        pl_sampler_destroy(workers[i].sampler);
+        pl_shader_destroy(workers[i].shader);
+    }
+    free(workers);
+    pl_scene_count_seconds(scene, seconds() - start);
+    if (ok && atomic_load(&job->cancelled))
+        return pl_fail(error, PL_ERROR_CANCELLED, "rendering", "stopped before the picture was complete");
+    if (ok && job->error.code != PL_OK) {
+        if (error) *error = job->error;
+        return false;
+    }
+    if (ok && job->options->progress) job->options->progress(job->options->context, 1.0);
+    return ok;
+}
+
+bool pl_render(pl_scene *scene, const pl_render_options *options, const pl_channels *channels, pl_error *error)
+{
+    pl_error_clear(error);
+    pl_view view;
+    if (!check(scene, options, channels, error) || !pl_view_create(&view, scene, error)) return false;
+    const uint32_t columns = (uint32_t)(options->width + PL_TILE - 1) / PL_TILE;
+    const uint32_t rows = (uint32_t)(options->height + PL_TILE - 1) / PL_TILE;
+    pl_job job = {
+        .options = options,
+        .channels = channels,
+        .wants_first = channels->depth || channels->normal || channels->position || channels->primitive ||
+                       channels->symbol || channels->rule || channels->recursion || channels->boxes ||
+                       channels->miss_depth,
+        .columns = columns,
+        .tiles = columns * rows,
+        .failed = UINT_MAX,
+        .lock = PTHREAD_MUTEX_INITIALIZER,
+    };
+    const bool ok = render(scene, &job, &view, error);
+    pl_view_free(&view);
+    return ok;
+}
