@@ -65,13 +65,18 @@ class Source:
         offset = max(0, min(offset, len(self.data)))
         line = bisect.bisect_right(self.line_starts, offset)
         start = self.line_starts[line - 1]
-        return Position(line, len(self.data[start:offset].decode(errors="replace")) + 1)
+        return Position(line, len(_text(self.data[start:offset])) + 1)
 
     def line_text(self, line: int) -> str:
         """The text of ``line`` (from 1) without its line end."""
         start = self.line_starts[line - 1]
         end = self.line_starts[line] if line < len(self.line_starts) else len(self.data)
-        return self.data[start:end].decode(errors="replace").rstrip("\r\n")
+        return _text(self.data[start:end]).rstrip("\r\n")
+
+
+def _text(line: bytes) -> str:
+    """What a line shows: a byte order mark at the start of a file is no character of it."""
+    return line.decode(errors="replace").removeprefix("\ufeff")
 
 
 @dataclass(frozen=True, eq=False, slots=True)

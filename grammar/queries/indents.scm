@@ -1,0 +1,17 @@
+; Indentation: one step inside of brackets, and on the lines that continue a rule.
+
+[
+  (selection_body)
+  (statements)
+  (block_body)
+  (braced)
+  (group)
+  (inline)
+  (map_entry)
+  (rule)
+] @indent.begin
+
+["}" ")" "]"] @indent.branch
+["}" ")" "]"] @indent.end
+
+(comment) @indent.ignore
