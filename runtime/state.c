@@ -43,7 +43,7 @@ typedef struct builder {
 /* Room for `more` elements at the end; NULL: no memory. */
 static void *extend(array *a, size_t more)
 {
-    if (a->count + more > a->capacity) {
+    if (a->count + more > a->capacity || !a->data) {
         size_t capacity = 2 * (a->count + more) + 8;
         void *data = realloc(a->data, capacity * a->element);
         if (!data) return NULL;
