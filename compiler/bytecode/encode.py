@@ -17,9 +17,9 @@ from ..reading.model import Constant, Mesh, Record
 from ..reading.source import Span
 from .assemble import Assembler, texture_values
 from .layout import GRAPH_ROWS, HEADER_SIZE, write_u
-from .layout_rows import MAGIC, RECORDS, SECTIONS, SENTINEL_FLOAT, SENTINEL_INTEGER, SHAPES, VERSION
+from .layout_rows import LIMITS, MAGIC, RECORDS, SECTIONS, SENTINEL_FLOAT, SENTINEL_INTEGER, SHAPES, VERSION
 
-MAX_LENGTH = 2**32 - 1
+MAX_LENGTH = LIMITS["bytes"]
 
 
 def encode(graph: g.Graph, sourcemap: bool = True) -> bytes:
