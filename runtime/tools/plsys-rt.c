@@ -1,0 +1,265 @@
+/* plsys-rt - draws a compiled scene without Python: bytecode in, picture out.
+ *
+ *     plsys compile tree.plsys -o tree.plsb
+ *     plsys-rt tree.plsb -o tree.pfm --size 640x480
+ *     plsys-rt tree.plsb --dump
+ *
+ * The picture is a portable float map: linear rgb, 32-bit floats, unclipped. Exit codes: 0 fine, 2 bad input, with one
+ * message on standard error and no output file. */
+#include <errno.h>
+#include <fcntl.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "plsys.h"
+
+static const char usage[] =
+    "usage: plsys-rt SCENE.plsb -o OUT.pfm [options]\n"
+    "       plsys-rt SCENE.plsb --dump\n"
+    "\n"
+    "Draws a compiled scene (`plsys compile`) into a portable float map: linear rgb, unclipped.\n"
+    "\n"
+    "  -o OUT.pfm          the picture\n"
+    "  --size WxH          in pixels (640x480)\n"
+    "  --threads N         1 to 1024 (one a core)\n"
+    "  --accel A           auto, none, boxes or bvh: same picture, different speed (auto)\n"
+    "  --antialias A       off, grid=N (centre and NxN sub-cells) or adaptive=DEPTH (off)\n"
+    "  --povray-epsilon    POV-Ray's hit and shadow tolerances\n"
+    "  --dump              print the bytecode as text instead\n"
+    "  --help              this text\n";
+
+typedef struct arguments {
+    const char *scene, *output;
+    bool dump;
+    pl_options options;
+    pl_render_options render;
+} arguments;
+
+__attribute__((format(printf, 1, 2))) static bool complain(const char *format, ...)
+{
+    va_list list;
+    va_start(list, format);
+    fputs("plsys-rt: error: ", stderr);
+    vfprintf(stderr, format, list);
+    fputc('\n', stderr);
+    va_end(list);
+    return false;
+}
+
+/* A whole number of [low, high] that ends at `end`. */
+static bool parse_number(const char *text, char end, long low, long high, int *number, const char **rest)
+{
+    char *after;
+    if (*text < '0' || *text > '9') return false;
+    errno = 0;
+    long value = strtol(text, &after, 10);
+    if (errno || *after != end || value < low || value > high) return false;
+    *number = (int)value;
+    if (rest) *rest = after + 1;
+    return true;
+}
+
+static bool parse_antialias(const char *text, pl_render_options *render)
+{
+    if (strcmp(text, "off") == 0) return true;
+    if (strncmp(text, "grid=", 5) == 0) {
+        render->antialias = PL_AA_GRID;
+        return parse_number(text + 5, '\0', 1, 256, &render->samples, NULL);
+    }
+    render->antialias = PL_AA_ADAPTIVE;
+    render->threshold = 0.3;
+    return strncmp(text, "adaptive=", 9) == 0 && parse_number(text + 9, '\0', 1, 9, &render->samples, NULL);
+}
+
+static bool parse_accelerator(const char *text, int *accelerator)
+{
+    static const char *const names[] = {"auto", "none", "boxes", "bvh"};
+    for (int i = 0; i < 4; i++)
+        if (strcmp(text, names[i]) == 0) {
+            *accelerator = i;
+            return true;
+        }
+    return false;
+}
+
+/* An option with a value. */
+static bool parse_value(arguments *a, const char *option, const char *value)
+{
+    const char *rest;
+    if (strcmp(option, "-o") == 0) {
+        a->output = value;
+        return true;
+    }
+    if (strcmp(option, "--size") == 0)
+        return (parse_number(value, 'x', 1, 1 << 20, &a->render.width, &rest) &&
+                parse_number(rest, '\0', 1, 1 << 20, &a->render.height, NULL)) ||
+               complain("--size %s: expected WxH, such as 640x480", value);
+    if (strcmp(option, "--threads") == 0)
+        return parse_number(value, '\0', 1, 1024, &a->options.threads, NULL) ||
+               complain("--threads %s: expected a number from 1 to 1024", value);
+    if (strcmp(option, "--accel") == 0)
+        return parse_accelerator(value, &a->options.accelerator) ||
+               complain("--accel %s: expected auto, none, boxes or bvh", value);
+    if (strcmp(option, "--antialias") == 0)
+        return parse_antialias(value, &a->render) ||
+               complain("--antialias %s: expected off, grid=N or adaptive=DEPTH", value);
+    return complain("no option '%s'; see --help", option);
+}
+
+static bool parse(int argc, char **argv, arguments *a)
+{
+    for (int i = 1; i < argc; i++) {
+        if (strcmp(argv[i], "--dump") == 0) {
+            a->dump = true;
+        } else if (strcmp(argv[i], "--povray-epsilon") == 0) {
+            a->options.povray_epsilon = true;
+        } else if (argv[i][0] == '-' && argv[i][1]) {
+            if (i + 1 == argc) return complain("%s needs a value, or is no option; see --help", argv[i]);
+            if (!parse_value(a, argv[i], argv[i + 1])) return false;
+            i++;
+        } else if (a->scene) {
+            return complain("one scene at a time, not '%s' and '%s'", a->scene, argv[i]);
+        } else {
+            a->scene = argv[i];
+        }
+    }
+    if (!a->scene) return complain("no scene given; see --help");
+    if (!a->dump && !a->output) return complain("no picture given: -o OUT.pfm");
+    return true;
+}
+
+/* --- files --- */
+
+/* The bytes of a file; NULL after a message. */
+static unsigned char *read_file(const char *path, size_t *length)
+{
+    size_t capacity = 1 << 16;
+    unsigned char *bytes = NULL;
+    FILE *file = fopen(path, "rb");
+    *length = 0;
+    while (file) {
+        unsigned char *more = realloc(bytes, capacity);
+        if (!more) {
+            errno = ENOMEM;
+            break;
+        }
+        bytes = more;
+        *length += fread(bytes + *length, 1, capacity - *length, file);
+        if (*length < capacity && !ferror(file)) {
+            fclose(file);
+            return bytes;
+        }
+        if (ferror(file)) break;
+        capacity *= 2;
+    }
+    complain("%s can't be read: %s", path, strerror(errno));
+    if (file) fclose(file);
+    free(bytes);
+    return NULL;
+}
+
+/* A new file beside `path`, under a name of its own that is written to `name`. */
+static FILE *create_beside(const char *path, char *name, size_t size)
+{
+    for (int try = 0; try < 100; try++) {
+        if ((size_t)snprintf(name, size, "%s.%ld-%d.part", path, (long)getpid(), try) >= size) {
+            errno = ENAMETOOLONG;
+            return NULL;
+        }
+        int descriptor = open(name, O_WRONLY | O_CREAT | O_EXCL, 0666);
+        if (descriptor >= 0) return fdopen(descriptor, "wb");
+        if (errno != EEXIST) return NULL;
+    }
+    return NULL;
+}
+
+/* Rows from the bottom up; the -1 says little-endian. */
+static bool write_pfm(FILE *file, const float *color, int width, int height)
+{
+    const uint32_t one = 1;
+    bool little = *(const unsigned char *)&one == 1;
+    fprintf(file, "PF\n%d %d\n%s\n", width, height, little ? "-1.0" : "1.0");
+    for (int row = height; row-- > 0;)
+        if (fwrite(color + (size_t)row * (size_t)width * 3, 3 * sizeof *color, (size_t)width, file) != (size_t)width)
+            return false;
+    return true;
+}
+
+/* --- drawing --- */
+
+static int report(const arguments *a, const pl_error *error)
+{
+    bool in_source = error->code == PL_ERROR_SCENE && error->place[0];
+    if (in_source) fprintf(stderr, "%s: error: %s\n", error->place, error->reason);
+    else fprintf(stderr, "%s: error: %s%s%s\n", a->scene, error->place, error->place[0] ? ": " : "", error->reason);
+    return 2;
+}
+
+static bool show_progress(void *context, double done)
+{
+    (void)context;
+    fprintf(stderr, "\r%3.0f %%", 100.0 * done);
+    return true;
+}
+
+static int dump(const arguments *a, const unsigned char *bytes, size_t length)
+{
+    pl_error error;
+    char *text = pl_disassemble(bytes, length, &error);
+    if (!text) return report(a, &error);
+    bool written = fputs(text, stdout) >= 0 && fflush(stdout) == 0;
+    pl_free(text);
+    if (!written) complain("standard output can't be written: %s", strerror(errno));
+    return written ? 0 : 2;
+}
+
+static int draw(arguments *a, const unsigned char *bytes, size_t length)
+{
+    char part[4096];
+    pl_error error;
+    pl_scene *scene = pl_scene_create(bytes, length, &a->options, &error);
+    if (!scene) return report(a, &error);
+    int status = 2;
+    float *color = malloc((size_t)a->render.width * (size_t)a->render.height * 3 * sizeof *color);
+    FILE *file = color ? create_beside(a->output, part, sizeof part) : NULL;
+    int create_error = errno;
+    bool quiet = !isatty(STDERR_FILENO);
+    if (!quiet) a->render.progress = show_progress;
+    if (!color) {
+        complain("there isn't enough memory for the picture");
+    } else if (!file) {
+        complain("%s can't be written: %s", a->output, strerror(create_error));
+    } else {
+        bool drawn = pl_render(scene, &a->render, &(pl_channels){.color = color}, &error);
+        if (!quiet) fputs("\r     \r", stderr);
+        bool written = drawn && write_pfm(file, color, a->render.width, a->render.height);
+        written = fclose(file) == 0 && written && rename(part, a->output) == 0;
+        if (!drawn) report(a, &error);
+        else if (!written) complain("%s can't be written: %s", a->output, strerror(errno));
+        if (!written) unlink(part);
+        status = written ? 0 : 2;
+    }
+    free(color);
+    pl_scene_destroy(scene);
+    return status;
+}
+
+int main(int argc, char **argv)
+{
+    arguments a = {.render = {.width = 640, .height = 480}};
+    for (int i = 1; i < argc; i++)
+        if (strcmp(argv[i], "--help") == 0) return fputs(usage, stdout) < 0;
+    if (!parse(argc, argv, &a)) return 2;
+    size_t length;
+    unsigned char *bytes = read_file(a.scene, &length);
+    if (!bytes) return 2;
+    int status = a.dump ? dump(&a, bytes, length) : draw(&a, bytes, length);
+    free(bytes);
+    return status;
+}
