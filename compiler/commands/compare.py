@@ -72,9 +72,7 @@ def render_ours(data: bytes, arguments: argparse.Namespace):
     """(channels, agrees, scene): our picture with POV-Ray's tolerances, a test of single rays, and the open scene."""
     from ...runtime import Scene
 
-    scene = Scene(
-        data, accelerator=arguments.accel, threads=arguments.threads or None, povray_epsilon=True
-    )
+    scene = Scene(data, accelerator=arguments.accel, threads=arguments.threads or None, povray_epsilon=True)
     image = scene.render(*arguments.size, channels=CHANNELS)
 
     def agrees(ray) -> bool:
@@ -119,7 +117,7 @@ def _compare(graph, image: dict, theirs, rays_agree, arguments: argparse.Namespa
         for pixel in found:
             pixel["difference"] = float(np.abs(ours - theirs)[pixel["y"], pixel["x"]].max())
     facts["classes"] = {name: sum(pixel["class"] == name for pixel in found) for name in CLASSES}
-    facts["differing"] = found
+    facts["differing"] = [pixel for pixel in found if pixel["class"] != "unclassified"]
     return facts, ours
 
 
@@ -129,9 +127,9 @@ def report(facts: dict, ours, theirs, arguments: argparse.Namespace) -> int:
 
     if arguments.output:
         facts["amplified"] = arguments.amplify or _amplification(facts["max_abs"])
-        write_side_by_side(arguments.output, ours, theirs, facts["amplified"])
+        write_side_by_side(arguments.output, ours, theirs, facts["amplified"], arguments.through or "POV-Ray")
         facts["image"] = arguments.output
-    facts["passed"] = passes(facts)
+    facts.setdefault("passed", passes(facts))
     if arguments.json:
         print_json(facts)
     else:
@@ -165,6 +163,16 @@ def text(facts: dict) -> str:
         f"  {facts['over_1e5']} of {facts['pixels']} pixels differ by more than 1e-5; "
         f"{facts['interior_over_1_255']} visibly and away from the {facts['edge_pixels']} edge pixels",
     ]
+    if mesh := facts.get("mesh"):
+        lines += [
+            f"  {mesh['triangles']:,} triangles, at most {mesh['error']:.3g} from the surfaces "
+            f"(tolerance {mesh['tolerance']:.3g}){', watertight' if mesh['watertight'] else ', NOT WATERTIGHT'}",
+            f"  volume {mesh['volume']:.9g} (its facets' {mesh['facets_volume']:.9g}, the scene's {mesh['exact_volume']:.9g}); "
+            f"bounds off by {mesh['bounds_error']:.3g}",
+            *(f"  not carried: {line}" for line in facts["lost"]),
+            "  the mesh is the scene" if facts["passed"] else "  THE MESH ISN'T THE SCENE",
+        ]
+        return "\n".join(lines)
     if facts["over_1e5"]:
         classes = ", ".join(f"{count} {name}" for name, count in facts["classes"].items() if count)
         lines.append(f"  traced again: {classes}")

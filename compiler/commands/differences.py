@@ -126,7 +126,9 @@ def classify(
 # --- side by side --------------------------------------------------------------------------------------------------------
 
 
-def write_side_by_side(path: str | Path, ours: np.ndarray, theirs: np.ndarray, factor: float) -> None:
+def write_side_by_side(
+    path: str | Path, ours: np.ndarray, theirs: np.ndarray, factor: float, their_name: str = "POV-Ray"
+) -> None:
     """Ours | theirs | their difference times ``factor``, with captions."""
     import OpenImageIO as oiio
 
@@ -139,6 +141,6 @@ def write_side_by_side(path: str | Path, ours: np.ndarray, theirs: np.ndarray, f
     for i, panel in enumerate((ours, theirs, difference)):
         sheet[band:, i * (width + gap) : i * (width + gap) + width] = panel
     picture = oiio.ImageBuf(np.ascontiguousarray(sheet))
-    for i, caption in enumerate(("plsys", "POV-Ray", f"|difference| x {factor:g}")):
+    for i, caption in enumerate(("plsys", their_name, f"|difference| x {factor:g}")):
         oiio.ImageBufAlgo.render_text(picture, i * (width + gap) + 8, 17, caption, 14, textcolor=(0.9, 0.9, 0.9))
     write_picture(path, picture.get_pixels(oiio.FLOAT), metadata={"Software": "plsys"})

@@ -27,25 +27,28 @@ from .unfold import SHAPE_NAMES, Instances, unfold
 
 DEFAULT_TOLERANCE = 1e-3  # of the scene's diagonal
 MOST_TRIANGLES = 20_000_000
+OPEN = "_open"  # in names of objects that needn't enclose a volume: flat shapes and meshes
 FINISHES = ("emission", "reflection")  # what a material of the format can't say
 
 
 @dataclass
 class ExportedMesh(Exported):
-    """``tolerance`` asked for and ``error`` reached, in scene units; ``volume`` of the solids and ``low``, ``high`` of
-    everything but planes are the exact scene's, not the mesh's."""
+    """``tolerance`` asked for and ``error`` reached, in scene units. ``volume`` of the solids and ``low``, ``high`` of
+    everything but planes are the exact scene's; ``mesh_volume`` is that of the facets, from closed forms as well."""
 
     tolerance: float = 0.0
     error: float = 0.0
     triangles: int = 0
     volume: float = 0.0
+    mesh_volume: float = 0.0
+    textures: dict[str, Texture | None] = field(default_factory=dict)  # by object name
     low: np.ndarray = field(default_factory=lambda: np.full(3, np.inf))
     high: np.ndarray = field(default_factory=lambda: np.full(3, -np.inf))
 
 
 @dataclass
 class _Part:
-    """The mesh of one texture's solids, or of its flat shapes."""
+    """The mesh of one texture's solids, or of its flat shapes and meshes."""
 
     name: str
     texture: Texture | None
@@ -75,6 +78,7 @@ def export_mesh(graph: Graph, path: str | Path, tolerance: float | None = None, 
     if not (0 < result.tolerance < math.inf):
         raise PlsysError(f"a tolerance must be a positive number of scene units, not {tolerance}")
     parts = _tessellate(graph, result, limits)
+    result.textures = {part.name: part.texture for part in parts}
     _note_losses(graph, result, parts)
     _write(parts, Path(path), result)
     return result
@@ -116,7 +120,7 @@ def _tessellate(graph: Graph, result: ExportedMesh, limits: dict[str, int]) -> l
 
 
 def _name(texture: Texture | None, solid: bool, taken: set[str]) -> str:
-    base = (texture.name if texture and texture.name else "Texture") + ("" if solid else "_flat")
+    base = (texture.name if texture and texture.name else "Texture") + ("" if solid else OPEN)
     name, number = base, 2
     while name in taken:
         name, number = f"{base}_{number}", number + 1
@@ -137,7 +141,9 @@ def _add(part: _Part, name: str, batch: Instances, graph: Graph, result: Exporte
     for i, (argument, scale) in enumerate(zip(batch.argument.tolist(), stretch.tolist())):
         groups.setdefault((argument, _segments(mesher, result.tolerance / scale, argument)), []).append(i)
     for (argument, n), rows in groups.items():
-        result.error = max(result.error, mesher.error(n, argument) * float(stretch[rows].max()))
+        if mesher.volume is not None:
+            result.mesh_volume += mesher.volume(n, argument) * math.fsum(np.abs(determinant(batch.matrix[rows])))
+        result.error = max(result.error, float(mesher.error(n, argument) * stretch[rows].max()))
         _place(part, batch.matrix[rows], *mesher.build(n, argument), result)
 
 
@@ -179,7 +185,7 @@ def _write(parts: list[_Part], path: Path, result: ExportedMesh) -> None:
     import trimesh
     from trimesh.exchange.obj import export_obj
 
-    digits = min(17, max(3, math.ceil(3 - math.log10(result.tolerance))))
+    digits = digits_of(result.tolerance)
     result.error += math.sqrt(3) / 2 * 10.0**-digits
     meshes = []
     for part in parts:
@@ -201,7 +207,7 @@ def _write(parts: list[_Part], path: Path, result: ExportedMesh) -> None:
         write_texture=False,
     )
     with whole_file(path) as file, whole_file(materials) as library:
-        library.write(files[materials.name].decode())
+        library.write(files[materials.name].decode() + "\n")
         file.write(text)
 
 
@@ -261,7 +267,7 @@ def read_back(path: str | Path) -> MeshRead:
     logging.getLogger("trimesh").setLevel(logging.ERROR)
     scene = trimesh.load_scene(path, split_objects=True, group_material=False, process=False, maintain_order=True)
     objects = {mesh.metadata.get("name", name): mesh for name, mesh in scene.geometry.items()}
-    solid = [mesh for name, mesh in objects.items() if "_flat" not in name]
+    solid = [mesh for name, mesh in objects.items() if OPEN not in name]
     corners = np.array([mesh.bounds for mesh in objects.values()])
     return MeshRead(
         triangles=sum(len(mesh.faces) for mesh in objects.values()),
@@ -275,8 +281,19 @@ def read_back(path: str | Path) -> MeshRead:
 
 
 def agrees(exported: ExportedMesh, read: MeshRead) -> bool:
-    """Whether a mesh read back has the volume and the bounds of the exact scene, as closely as its error promises:
-    a surface moved by at most e changes the volume by at most area·e (to first order; doubled for the rest)."""
-    close = np.abs(np.concatenate([read.low - exported.low, read.high - exported.high])) <= exported.error * 1.001
-    return bool(close.all()) and abs(read.volume - exported.volume) <= 2 * read.area * exported.error + 1e-9
+    """Whether a mesh read back is closed and has the scene's bounds within the stated error, the facets' volume within
+    the rounding of its numbers, and the exact volume as closely as surfaces moved by the error can have it (area
+    times error to first order; doubled for the rest)."""
+    off = np.abs(np.concatenate([read.low - exported.low, read.high - exported.high]))
+    rounding = read.area * 10.0 ** -digits_of(exported.tolerance) + 1e-12
+    return (
+        read.watertight
+        and bool((off <= exported.error * (1 + 1e-9)).all())
+        and abs(read.volume - exported.mesh_volume) <= rounding
+        and abs(read.volume - exported.volume) <= 2 * read.area * exported.error + rounding
+    )
 
+
+def digits_of(tolerance: float) -> int:
+    """Decimals that keep rounding below a thousandth of the tolerance."""
+    return min(17, max(3, math.ceil(3 - math.log10(tolerance))))

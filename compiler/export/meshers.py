@@ -26,11 +26,16 @@ def _chord(n: float) -> float:
 
 @dataclass(frozen=True)
 class Mesher:
-    """``solid`` shapes enclose a volume. ``error`` is 0 where triangles are exact."""
+    """``error`` is 0 where triangles are exact. ``volume`` is what the triangles enclose, in closed form; None for
+    flat shapes, which enclose nothing."""
 
     build: Callable[[int, float], Triangles]
     error: Callable[[int, float], float]
-    solid: bool
+    volume: Callable[[int, float], float] | None = None
+
+    @property
+    def solid(self) -> bool:
+        return self.volume is not None
 
 
 def segments_for(mesher: Mesher, relative: float, argument: float) -> int:
@@ -114,14 +119,35 @@ def _exact(n: int, argument: float) -> float:
     return 0.0
 
 
+def _turned(n: int, r: np.ndarray, z: np.ndarray) -> float:
+    """Volume of the profile (r, z), a chain of straight pieces, turned about z in n flat steps: each piece is a
+    frustum over a regular n-gon."""
+    pieces = np.diff(z) * (r[:-1] ** 2 + r[:-1] * r[1:] + r[1:] ** 2) / 3
+    return float(n / 2 * np.sin(2 * np.pi / n) * pieces.sum())
+
+
+def _frustum_volume(n: int, top: float) -> float:
+    return _turned(n, np.array([1.0, top]), np.array([0.0, 1.0]))
+
+
+def _sphere_volume(n: int, _: float) -> float:
+    angle = np.pi * np.arange(n // 2 + 1) / (n // 2)
+    return _turned(n, np.sin(angle), -np.cos(angle))
+
+
+def _torus_volume(n: int, minor: float) -> float:
+    angle = 2 * np.pi * np.arange(n + 1) / n
+    return _turned(n, 1 + minor * np.cos(angle), minor * np.sin(angle))
+
+
 MESHERS = {
     # A facet of the sphere spans one step of longitude and one of latitude; the torus's likewise.
-    "sphere": Mesher(sphere, lambda n, _: 2 * _chord(n), True),
-    "cylinder": Mesher(lambda n, _: frustum(n, 1.0), lambda n, _: _chord(n), True),
-    "cone": Mesher(frustum, lambda n, top: max(1.0, top) * _chord(n), True),
-    "box": Mesher(box, _exact, True),
-    "torus": Mesher(torus, lambda n, minor: (1 + 2 * minor) * _chord(n), True),
-    "triangle": Mesher(triangle, _exact, False),
-    "square": Mesher(square, _exact, False),
-    "disc": Mesher(disc, lambda n, _: _chord(n), False),
+    "sphere": Mesher(sphere, lambda n, _: 2 * _chord(n), _sphere_volume),
+    "cylinder": Mesher(lambda n, _: frustum(n, 1.0), lambda n, _: _chord(n), lambda n, _: _frustum_volume(n, 1.0)),
+    "cone": Mesher(frustum, lambda n, top: max(1.0, top) * _chord(n), _frustum_volume),
+    "box": Mesher(box, _exact, lambda n, _: 1.0),
+    "torus": Mesher(torus, lambda n, minor: (1 + 2 * minor) * _chord(n), _torus_volume),
+    "triangle": Mesher(triangle, _exact),
+    "square": Mesher(square, _exact),
+    "disc": Mesher(disc, lambda n, _: _chord(n)),
 }

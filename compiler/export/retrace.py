@@ -169,11 +169,13 @@ class Retracer:
             inverse = np.linalg.inv(m[:, :3]).astype(LONG)
             points = (points - m[:, 3]) @ inverse.T
         if texture.pattern == "checker":
-            cell = np.floor(points + CHECKER_BIAS).sum(axis=1)
+            value, margin = points + CHECKER_BIAS, CHECKER_BIAS / 100
         else:
             direction = texture.value("direction")
-            cell = np.floor(points @ (direction / np.linalg.norm(direction)))
-        return bool((cell != cell[0]).any())
+            value, margin = (points @ (direction / np.linalg.norm(direction)))[:, None], 1e-9
+        cell = np.floor(value)
+        close = np.abs(value[0] - np.rint(value[0])) < margin * np.maximum(1, np.abs(value[0]))
+        return bool((cell != cell[0]).any() or close.any())
 
     # --- geometry ----------------------------------------------------------------------------------------------------
 
