@@ -32,7 +32,9 @@ def language() -> Language:
     try:
         library = ctypes.CDLL(str(LIBRARY))
     except OSError as error:
-        raise PlsysError(f"the compiled grammar can't be loaded ({error}); 'make dev' builds it", str(LIBRARY)) from None
+        raise PlsysError(
+            f"the compiled grammar can't be loaded ({error}); 'make dev' builds it", str(LIBRARY)
+        ) from None
     library.tree_sitter_plsys.restype = ctypes.c_void_p
     new_capsule = ctypes.pythonapi.PyCapsule_New
     new_capsule.restype = ctypes.py_object

@@ -54,7 +54,16 @@ _EXPECTED = {
 }
 
 # Nodes in which a missing name is one that is being defined or called, and not an operand.
-_NAMING = ("selection", "calculation", "transformation", "parameters", "named_block", "declare", "parameter", "step")
+_NAMING = (
+    "selection",
+    "calculation",
+    "transformation",
+    "parameters",
+    "named_block",
+    "declare",
+    "parameter",
+    "step",
+)
 
 # What may stand outside of strings and comments.
 _KNOWN = re.compile(r"[A-Za-z0-9_\s\"#%()*+,\-./:;<=>?\[\]{}!&|→\u00C0-\u1FFF\u2C00-\uD7FF]")
@@ -124,8 +133,12 @@ def extras(reading: Reading, tree: Tree) -> None:
     while last is not None and last.type != "comment":
         last = last.children[-1] if last.children else None
     if last is not None and _is_unclosed_comment(reading.text(last)):
-        reading.complain(Span(reading.source, last.start_byte, last.start_byte + 2), "this comment is never closed",
-                         "add */ where it ends", "unclosed")
+        reading.complain(
+            Span(reading.source, last.start_byte, last.start_byte + 2),
+            "this comment is never closed",
+            "add */ where it ends",
+            "unclosed",
+        )
 
 
 def _is_unclosed_comment(text: str) -> bool:
@@ -138,7 +151,9 @@ def _directive(reading: Reading, node: Node, seen: bool) -> None:
         return  # belongs to a directive that has been reported
     span = Span(reading.source, node.start_byte, node.start_byte + len(word[0].encode()))
     if not word[1]:
-        reading.complain(span, "a directive's name is missing after this '#'", "plsys has #declare and #include")
+        reading.complain(
+            span, "a directive's name is missing after this '#'", "plsys has #declare and #include"
+        )
         return
     if word[1] in _DIRECTIVES:
         reading.complain(span, "a space stands between '#' and the directive's name", f"write #{word[1]}")
@@ -252,7 +267,7 @@ def unmatched_bracket(reading: Reading, tree: Tree) -> Diagnostic | None:
     open_brackets: list[Node] = []
     cursor = tree.walk()
     while True:
-        kind = cursor.node.type
+        kind = "" if cursor.node.is_missing else cursor.node.type
         if kind in CLOSERS.values():
             open_brackets.append(cursor.node)
         elif kind in CLOSERS and open_brackets and open_brackets[-1].type == CLOSERS[kind]:

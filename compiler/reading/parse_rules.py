@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from . import syntax
 from .mistakes import RULE
-from .parse_values import MAX_DEPTH, Reading, TooDeep, call, expression, name, number, statements
+from .parse_statements import statements
+from .parse_values import MAX_DEPTH, Reading, TooDeep, call, expression, is_stray, name
 from .source import Span
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tree_sitter import Node
-
 
 
 class _Piece(NamedTuple):
@@ -76,7 +76,7 @@ class _Body:
                 found += self.entries(node)
             elif node.type == "braced":
                 found += self.braced(node, depth)
-            elif node.type == "stray":
+            elif is_stray(node):
                 self.reading.complain(node, f"this '{self.reading.text(node)}' ends nothing", "remove it")
         return found
 
@@ -100,8 +100,11 @@ class _Body:
 
     def braced(self, node: Node, depth: int) -> list[_Piece]:
         opener = node.children[0]
-        self.reading.complain(opener, "braces don't surround rules",
-                              "remove them: after if (…) and else stands exactly one rule")
+        self.reading.complain(
+            opener,
+            "braces don't surround rules",
+            "remove them: after if (…) and else stands exactly one rule",
+        )
         return self.pieces(node.children, depth + 1)
 
     def production(self, pieces: list[_Piece], i: int, depth: int) -> tuple[syntax.Production | None, int]:
@@ -112,7 +115,9 @@ class _Body:
         if piece.kind == "rule":
             return piece.value, i + 1
         if piece.kind == "else":
-            self.reading.complain(piece.span, "this 'else' belongs to no 'if'", "an else follows the rule of an if")
+            self.reading.complain(
+                piece.span, "this 'else' belongs to no 'if'", "an else follows the rule of an if"
+            )
             return None, i + 1
         then, i = self.guarded(pieces, i + 1, piece, depth)
         otherwise = None
@@ -129,8 +134,12 @@ class _Body:
         """The production after a guard; complains when there is none."""
         if i < len(pieces) and pieces[i].kind != "else":
             return self.production(pieces, i, depth + 1)
-        self.reading.complain(self.reading.after(guard.span.end), f"a rule is missing after this '{guard.kind}'",
-                              RULE, "missing")
+        self.reading.complain(
+            self.reading.after(guard.span.end),
+            f"a rule is missing after this '{guard.kind}'",
+            RULE,
+            "missing",
+        )
         while guard.kind == "else" and i < len(pieces) and pieces[i].kind == "else":
             i += 1
         return None, i
@@ -166,7 +175,9 @@ class _Body:
     def arrow(self, node: Node) -> None:
         arrow = node.child_by_field_name("arrow")
         if arrow is not None and not arrow.is_missing and self.reading.text(arrow) != "->":
-            self.reading.complain(arrow, f"'{self.reading.text(arrow)}' stands where a rule has '->'", "write ->")
+            self.reading.complain(
+                arrow, f"'{self.reading.text(arrow)}' stands where a rule has '->'", "write ->"
+            )
 
     def split_late(
         self, alternatives: tuple[syntax.Alternative, ...], late: list[Node], node: Node, what: str
@@ -187,8 +198,9 @@ class _Body:
         for i, rule in enumerate(late):
             target, union_left, end = self.take_last(union)
             if target is None:
-                self.reading.complain(rule.children[0], "nothing stands before this arrow that a rule could be for",
-                                      RULE)
+                self.reading.complain(
+                    rule.children[0], "nothing stands before this arrow that a rule could be for", RULE
+                )
                 return union, pieces
             if i == 0:
                 first = union_left
@@ -207,8 +219,12 @@ class _Body:
             union = first
         return union, pieces
 
-    def complain_before(self, rule: Node, target: syntax.Node, end: int | None, before: Node, what: str) -> None:
-        if end is None:  # nothing stands before the name but an arrow: an empty rule without ';', or two arrows
+    def complain_before(
+        self, rule: Node, target: syntax.Node, end: int | None, before: Node, what: str
+    ) -> None:
+        if (
+            end is None
+        ):  # nothing stands before the name but an arrow: an empty rule without ';', or two arrows
             arrow = before.child_by_field_name("arrow")
             end = arrow.end_byte if arrow is not None else before.start_byte
         if end > target.span.start or (before.type == "entry" and end == before.start_byte):
@@ -222,7 +238,9 @@ class _Body:
         return piece._replace(value=replace(rule, alternatives=(*rule.alternatives[:-1], last)))
 
     @staticmethod
-    def take_last(union: syntax.Union | None) -> tuple[syntax.Name | syntax.Call | None, syntax.Union | None, int | None]:
+    def take_last(
+        union: syntax.Union | None,
+    ) -> tuple[syntax.Name | syntax.Call | None, syntax.Union | None, int | None]:
         """The last item of ``union`` if it can be a rule's name, the union without it, and where that ends."""
         if union is None:
             return None, None, None
@@ -242,13 +260,17 @@ class _Body:
         nodes = [child for child in node.children if child.type == "alternative"]
         found = [self.alternative(child) for child in nodes]
         for child in node.children:
-            if child.type == "stray":
-                self.reading.complain(child, "an alternative is missing after this '|'", "write A -> 3: x | 1: y;")
+            if is_stray(child):
+                self.reading.complain(
+                    child, "an alternative is missing after this '|'", "write A -> 3: x | 1: y;"
+                )
         if not found:
             return (syntax.Alternative(self.reading.span(node), None, None),)
         unweighted = [each for each in found if each.weight is None]
         if len(found) > 1 and unweighted and not node.has_error:
-            self.reading.complain(unweighted[0].span, "this alternative has no weight", "write A -> 3: x | 1: y;")
+            self.reading.complain(
+                unweighted[0].span, "this alternative has no weight", "write A -> 3: x | 1: y;"
+            )
         return tuple(found)
 
     def alternative(self, node: Node) -> syntax.Alternative:
@@ -267,13 +289,15 @@ class _Body:
                 term = self.term(child, depth)
                 if term is not None:
                     terms.append(term)
-            elif child.type == "stray":
-                self.reading.complain(child, "nothing stands after this '+'", "add an operand, or remove the '+'")
+            elif is_stray(child):
+                self.reading.complain(
+                    child, "nothing stands after this '+'", "add an operand, or remove the '+'"
+                )
         return syntax.Union(self.reading.span(node), tuple(terms)) if terms else None
 
     def term(self, node: Node, depth: int) -> syntax.Term | None:
         items = []
-        strays = [child for child in node.children if child.type == "stray"]
+        strays = [child for child in node.children if is_stray(child)]
         if strays:
             self.complain_stray(strays[0])
         for child in node.children:
@@ -295,7 +319,9 @@ class _Body:
             hint = "'+' joins what a rule produces"
         self.reading.complain(node, f"'{text}' can't stand in a rule", hint)
 
-    def item(self, node: Node, depth: int) -> syntax.Name | syntax.Call | syntax.Inline | syntax.Group | syntax.Block | None:
+    def item(
+        self, node: Node, depth: int
+    ) -> syntax.Name | syntax.Call | syntax.Inline | syntax.Group | syntax.Block | None:
         reading = self.reading
         if node.type == "name":
             return name(reading, node)
@@ -330,8 +356,11 @@ class _Body:
             return union.terms[0]
         if len(items) <= 2 and all(isinstance(item, syntax.Name | syntax.Inline) for item in items):
             written = " ".join(item.name for item in items[:1] if isinstance(item, syntax.Name)) or "[…]"
-            self.reading.complain(union.span, f"an entry action ends with its Selection's name, {self.own_name}",
-                                  f"write {written} {self.own_name};")
+            self.reading.complain(
+                union.span,
+                f"an entry action ends with its Selection's name, {self.own_name}",
+                f"write {written} {self.own_name};",
+            )
             return syntax.Term(union.span, (*items[:1], syntax.Name(last.span, self.own_name)))
         return None
 
@@ -340,16 +369,25 @@ class _Body:
         union = piece.value
         items = union.terms[0].items
         first, last = items[0], items[-1]
-        is_entry = len(union.terms) == 1 and len(items) > 1 and isinstance(last, syntax.Name) and last.name == self.own_name
+        is_entry = (
+            len(union.terms) == 1
+            and len(items) > 1
+            and isinstance(last, syntax.Name)
+            and last.name == self.own_name
+        )
         if is_entry and not (isinstance(first, syntax.Name) and first.name == self.own_name):
-            self.reading.complain(union.span, "an entry action is the first line of its Selection",
-                                  "join several into one: C_a C_b Name;")
+            self.reading.complain(
+                union.span,
+                "an entry action is the first line of its Selection",
+                "join several into one: C_a C_b Name;",
+            )
             return None
         if not isinstance(first, syntax.Name | syntax.Call):
             self.reading.complain(union.span, "this is no rule", RULE)
             return None
-        self.reading.complain(self.reading.after(first.span.end), "missing '->' after the rule's name",
-                              RULE, "missing")
+        self.reading.complain(
+            self.reading.after(first.span.end), "missing '->' after the rule's name", RULE, "missing"
+        )
         rest = items[1:]
         terms = union.terms[1:]
         if rest:

@@ -1,4 +1,4 @@
-"""Expressions and statements: nodes of tree-sitter's tree → nodes of :mod:`syntax`.
+"""Expressions: nodes of tree-sitter's tree → nodes of :mod:`syntax`.
 
 The grammar accepts common mistakes; each is explained here, where it is read, and read on as what was probably
 meant. What can't be used at all (a gap that tree-sitter filled in) becomes None and is left out by the caller.
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 MAX_DEPTH = 128
 
 _NUMBER = re.compile(r"\d+(\.\d+)?([eE][+-]?\d+)?")
-_LOOPS = ("for", "while", "do", "return")
 _ESCAPE = re.compile(r"\\(.)")
 _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 
@@ -60,7 +59,14 @@ class Reading:
     def text(self, node: Node) -> str:
         return self.data[node.start_byte : node.end_byte].decode(errors="replace")
 
-    def complain(self, node: Node | Span, message: str, hint: str = "", code: str = "syntax", notes: tuple[Note, ...] = ()) -> None:
+    def complain(
+        self,
+        node: Node | Span,
+        message: str,
+        hint: str = "",
+        code: str = "syntax",
+        notes: tuple[Note, ...] = (),
+    ) -> None:
         span = node if isinstance(node, Span) else self.span(node)
         self.diagnostics.add(code, span, message, hint, notes)
 
@@ -88,7 +94,14 @@ class Reading:
 
     def never_closed(self, offset: int, opener: str, closer: str) -> None:
         span = Span(self.source, offset, offset + len(opener))
-        self.complain(span, f"this '{opener}' is never closed", f"add the '{closer}' that belongs to it", "unclosed")
+        self.complain(
+            span, f"this '{opener}' is never closed", f"add the '{closer}' that belongs to it", "unclosed"
+        )
+
+
+def is_stray(node: Node) -> bool:
+    """Whether ``node`` is a token in the wrong place (and not one that tree-sitter put in)."""
+    return node.type == "stray" and not node.is_missing
 
 
 # --- expressions
@@ -123,7 +136,9 @@ def name(reading: Reading, node: Node | None) -> syntax.Name:
     text = reading.text(node)
     if not text.isascii() and text not in reading.foreign_names:
         reading.foreign_names.add(text)
-        reading.complain(node, f"the name '{text}' has letters outside of A to Z", "use the letters A to Z, digits and '_'")
+        reading.complain(
+            node, f"the name '{text}' has letters outside of A to Z", "use the letters A to Z, digits and '_'"
+        )
     return syntax.Name(reading.span(node), text)
 
 
@@ -154,8 +169,11 @@ def _malformed_number(reading: Reading, node: Node, text: str) -> syntax.Number:
         reading.complain(node, f"'{text}' lacks a digit after the point", f"write {fixed}")
         text = fixed
     elif match := re.fullmatch(r"(\d+(?:\.\d+)?)([A-Za-z_]\w*)", text):
-        reading.complain(node, f"the number {match[1]} touches the name {match[2]}",
-                         f"write {match[1]}*{match[2]} for the product, or a space between two values")
+        reading.complain(
+            node,
+            f"the number {match[1]} touches the name {match[2]}",
+            f"write {match[1]}*{match[2]} for the product, or a space between two values",
+        )
     else:
         reading.complain(node, f"'{text}' is no number", "a number looks like 2, 0.5 or 1.5e-3")
     start = _NUMBER.match(text)
@@ -168,7 +186,9 @@ def string(reading: Reading, node: Node | None, depth: int = 0) -> syntax.String
         return None
     text = reading.text(node)
     if not re.fullmatch(r'"([^"\\]|\\.)*"', text):
-        reading.complain(node, "this string is never closed", "add '\"' at its end, on the same line", "unclosed")
+        reading.complain(
+            node, "this string is never closed", "add '\"' at its end, on the same line", "unclosed"
+        )
         text += '"'
     value = _ESCAPE.sub(lambda match: _ESCAPES.get(match[1], match[0]), text[1:-1])
     return syntax.String(reading.span(node), value)
@@ -179,8 +199,11 @@ def call(reading: Reading, node: Node, depth: int = 0) -> syntax.Call:
     bracket = node.children[1]
     if bracket.start_byte > callee.end_byte:
         text = reading.text(callee)
-        reading.complain(Span(reading.source, callee.start_byte, bracket.end_byte),
-                         "a space stands between a function and its bracket", f"write {text}(…)")
+        reading.complain(
+            Span(reading.source, callee.start_byte, bracket.end_byte),
+            "a space stands between a function and its bracket",
+            f"write {text}(…)",
+        )
     need_parenthesis(reading, node, bracket)
     arguments = expressions(reading, node.children_by_field_name("argument"), depth)
     return syntax.Call(reading.span(node), name(reading, callee), arguments)
@@ -199,8 +222,11 @@ def _vector(reading: Reading, node: Node, depth: int) -> syntax.Vector:
         reading.never_closed(node.start_byte, "<", ">")
     components = expressions(reading, node.named_children, depth)
     if len(components) not in (2, 3, 4, 5, 12) and not node.has_error:
-        reading.complain(node, f"a vector has 2 to 5 components, or a matrix's 12; this one has {len(components)}",
-                         "write <x, y, z>; a comparison in it stands in brackets")
+        reading.complain(
+            node,
+            f"a vector has 2 to 5 components, or a matrix's 12; this one has {len(components)}",
+            "write <x, y, z>; a comparison in it stands in brackets",
+        )
     return syntax.Vector(reading.span(node), components)
 
 
@@ -232,8 +258,12 @@ def _binary(reading: Reading, node: Node, depth: int) -> syntax.Expression | Non
         sign = node.children[1]
         operator = reading.text(sign).strip()
         if operator == "=":
-            reading.complain(sign, "'=' assigns a value and can't stand inside an expression", "'==' compares",
-                             "assignment-in-condition")
+            reading.complain(
+                sign,
+                "'=' assigns a value and can't stand inside an expression",
+                "'==' compares",
+                "assignment-in-condition",
+            )
             operator = "=="
         right = expression(reading, node.children[-1], depth + 1)
         if left is None or right is None:
@@ -243,7 +273,10 @@ def _binary(reading: Reading, node: Node, depth: int) -> syntax.Expression | Non
 
 
 def _conditional(reading: Reading, node: Node, depth: int) -> syntax.Conditional | None:
-    parts = [expression(reading, node.child_by_field_name(field), depth + 1) for field in ("test", "then", "otherwise")]
+    parts = [
+        expression(reading, node.child_by_field_name(field), depth + 1)
+        for field in ("test", "then", "otherwise")
+    ]
     return None if None in parts else syntax.Conditional(reading.span(node), *parts)
 
 
@@ -258,79 +291,3 @@ _EXPRESSIONS = {
     "conditional": _conditional,
     "parenthesized": _parenthesized,
 }
-
-
-# --- statements
-
-
-def statements(reading: Reading, nodes: list[Node], last_needs_semicolon: bool = True) -> tuple[syntax.Statement, ...]:
-    """The statements among ``nodes``, children of a body or of an inline operator."""
-    found: list[syntax.Statement] = []
-    usable = [node for node in nodes if node.type in _STATEMENTS]
-    for node in usable:
-        if node is not usable[-1] or last_needs_semicolon:
-            reading.need_semicolon(node, "this statement")
-        found += _STATEMENTS[node.type](reading, node)
-    return tuple(found)
-
-
-def _assignment(reading: Reading, node: Node) -> list[syntax.Statement]:
-    target, operator = node.child_by_field_name("target"), node.child_by_field_name("operator")
-    value = expression(reading, node.child_by_field_name("value"))
-    if value is None:
-        return []
-    return [syntax.Assignment(reading.span(node), name(reading, target), reading.text(operator), value)]
-
-
-def _step(reading: Reading, node: Node) -> list[syntax.Statement]:
-    target, operator = node.child_by_field_name("target"), node.child_by_field_name("operator")
-    return [syntax.Assignment(reading.span(node), name(reading, target), reading.text(operator), None)]
-
-
-def _operation(reading: Reading, node: Node) -> list[syntax.Statement]:
-    called = node.child_by_field_name("call")
-    if called is not None:
-        operation = call(reading, called)
-        reading.complain(called, "an operation's arguments stand without brackets",
-                         f"write {operation.name.name} and its arguments, side by side or with commas")
-        return [syntax.Operation(reading.span(node), operation.name, operation.arguments)]
-    parts = [child for child in node.children if child.type != ";"]
-    found: list[syntax.Statement] = []
-    for start, end in _split_lines(reading, parts):
-        found.append(_one_operation(reading, parts[start:end]))
-        if end < len(parts):
-            reading.missing_semicolon(parts[end - 1].end_byte, "this statement")
-    return found
-
-
-def _split_lines(reading: Reading, parts: list[Node]) -> list[tuple[int, int]]:
-    """Where a ';' is missing at a line's end, the next line's operation reads as more arguments. A name that
-    begins a line no deeper than the operation does starts a new one."""
-    starts = [0]
-    column = parts[0].start_point[1]
-    for i in range(1, len(parts)):
-        begins_line = parts[i].start_point[0] > parts[i - 1].end_point[0]
-        if begins_line and parts[i].type == "name" and parts[i].start_point[1] <= column:
-            starts.append(i)
-    return list(zip(starts, [*starts[1:], len(parts)]))
-
-
-def _one_operation(reading: Reading, parts: list[Node]) -> syntax.Operation:
-    if reading.text(parts[0]) in _LOOPS:
-        hint = "a Selection repeats: Selection Row { if (n > 0) Row -> C_count Row; }"
-        raise Abandon(reading.span(parts[0]), f"'{reading.text(parts[0])}' is no statement", hint)
-    commas = [part for part in parts if part.type == ","]
-    arguments = expressions(reading, [part for part in parts[1:] if part.type != ","], 0)
-    # With commas, arguments and commas take turns.
-    if commas and [part.type == "," for part in parts[1:]] != [i % 2 == 1 for i in range(2 * len(arguments) - 1)]:
-        text = reading.text(parts[0])
-        if len(commas) < len(arguments) - 1:
-            reading.complain(commas[0], "commas stand between some of these arguments only",
-                             f"write {text} with a comma between all arguments, or with none")
-        else:
-            reading.complain(commas[-1], "this ',' separates nothing", "remove it")
-    span = Span(reading.source, parts[0].start_byte, parts[-1].end_byte)
-    return syntax.Operation(span, name(reading, parts[0]), arguments)
-
-
-_STATEMENTS = {"assignment": _assignment, "step": _step, "operation": _operation}

@@ -17,7 +17,10 @@ from plsys.compiler.reading.grammar import language, syntax_tree
 
 GRAMMAR = Path(__file__).resolve().parents[2] / "grammar"
 CORPUS = sorted((GRAMMAR / "test/corpus").glob("*.txt"))
-CASE = re.compile(r"={80}\n(?P<title>[^\n]*)\n(?P<flags>(?::\w+\n)*)={80}\n\n(?P<text>.*?)\n\n-{80}\n(?P<tree>[^=]*)", re.DOTALL)
+CASE = re.compile(
+    r"={80}\n(?P<title>[^\n]*)\n(?P<flags>(?::\w+\n)*)={80}\n\n(?P<text>.*?)\n\n-{80}\n(?P<tree>[^=]*)",
+    re.DOTALL,
+)
 
 
 class Case(NamedTuple):
@@ -71,7 +74,9 @@ def test_bless() -> None:
         parts = []
         for case in cases(path):
             tree = "" if case.flags else tree_text(case.text) + "\n\n"
-            parts.append(f"{'=' * 80}\n{case.title}\n{case.flags}{'=' * 80}\n\n{case.text}\n\n{'-' * 80}\n\n{tree}")
+            parts.append(
+                f"{'=' * 80}\n{case.title}\n{case.flags}{'=' * 80}\n\n{case.text}\n\n{'-' * 80}\n\n{tree}"
+            )
         text = "\n".join(part.rstrip("\n") + "\n" for part in parts)
         if os.environ.get("PLSYS_BLESS"):
             path.write_text(text)
@@ -94,7 +99,10 @@ def test_highlights_tell_what_things_are() -> None:
     text = b'Selection Tree { if (n > 0) Tree -> C_x T_y cylinder; } // end\nParameter n = 1 "age";\ncamera { angle 45 }'
     query = Query(language(), (GRAMMAR / "queries/highlights.scm").read_text())
     captures = QueryCursor(query).captures(syntax_tree(text).root_node)
-    found = {name: {text[node.start_byte : node.end_byte].decode() for node in nodes} for name, nodes in captures.items()}
+    found = {
+        name: {text[node.start_byte : node.end_byte].decode() for node in nodes}
+        for name, nodes in captures.items()
+    }
     assert {"Selection", "Parameter"} <= found["keyword"] and "if" in found["keyword.conditional"]
     assert "Tree" in found["type.definition"]
     assert found["comment"] == {"// end"} and found["string"] == {'"age"'}

@@ -18,7 +18,9 @@ def test_parser_is_current(tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=GRAMMAR, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     for name in ("parser.c", "grammar.json", "node-types.json"):
-        assert (tmp_path / name).read_text() == (GRAMMAR / "src" / name).read_text(), f"{name}: generate it again"
+        assert (tmp_path / name).read_text() == (GRAMMAR / "src" / name).read_text(), (
+            f"{name}: generate it again"
+        )
 
 
 def test_reserved_words_are_the_languages_six() -> None:

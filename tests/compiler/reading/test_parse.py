@@ -1,7 +1,6 @@
 """Text → syntax tree, and what is said about text that isn't one.
 
-``tests/cases/syntax/*.txt`` hold a scene, a line ``----``, and the messages it gets; ``PLSYS_BLESS=1`` rewrites
-the messages.
+``tests/cases/syntax/*.txt`` hold a scene, a line ``----``, and its messages; ``PLSYS_BLESS=1`` rewrites those.
 """
 
 from __future__ import annotations
@@ -156,13 +155,17 @@ def test_entry_action_and_parameters() -> None:
 )
 def test_a_sign_touches_only_what_follows(text: str, expected: list[str] | None) -> None:
     if expected is None:
-        assert messages(f"Transformation T {{ trans {text}; }}") == ["commas stand between some of these arguments only"]
+        assert messages(f"Transformation T {{ trans {text}; }}") == [
+            "commas stand between some of these arguments only"
+        ]
     else:
         assert arguments(text) == expected
 
 
 def test_items_of_a_block_stand_as_written() -> None:
-    block = read("camera { location <0, -R, R-1> angle 45 [0.3 color rgb 1] pigment { rgb 1 -1 } }").definitions[0]
+    block = read(
+        "camera { location <0, -R, R-1> angle 45 [0.3 color rgb 1] pigment { rgb 1 -1 } }"
+    ).definitions[0]
     assert outline(block.items) == (
         "location",
         ("Vector", (0.0, ("Unary", "-", "R"), ("Binary", "-", "R", 1.0))),
@@ -278,9 +281,14 @@ def test_many_openers_give_few_messages(opener: str) -> None:
         assert 1 <= len(found) <= 12
 
 
+def test_many_unclosed_blocks_stay_apart() -> None:
+    file, diagnostics = parse(Source.from_text("a { angle 1\n" * DEEP))
+    assert len(file.definitions) == len(diagnostics.items) == DEEP
+
+
 PIECES = st.sampled_from(
     "Selection Calculation Transformation Texture Parameter if else elseif #declare #include #while A B camera "
-    "{ } ( ) [ ] < > ; , : = -> => + - * / -- ++ -= | ? && == 1 2.5 .5 5. 2x 1e3 \" \"s\" // /* */ @ é − \n \t \r "
+    '{ } ( ) [ ] < > ; , : = -> => + - * / -- ++ -= | ? && == 1 2.5 .5 5. 2x 1e3 " "s" // /* */ @ é − \n \t \r '
     "\0 rgb texture to for".split(" ")
 )
 
