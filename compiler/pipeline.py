@@ -54,12 +54,17 @@ def build(
 
     ``parameters`` sets the scene's ``Parameter`` inputs, ``seed`` replaces global_settings' seed. Raises SceneError
     with every diagnostic of a scene that has errors, PlsysError for a file that can't be read."""
+    from .graph.limits import check_limits
+
     source = read(scene)
     with deep_nesting(source.name):
         model, diagnostics = build_model(source, parameters, seed)
         if diagnostics.has_errors:
             raise SceneError(diagnostics.sorted())
         graph = build_graph(model)
+        check_limits(graph, diagnostics)
+        if diagnostics.has_errors:
+            raise SceneError(diagnostics.sorted())
     return Compilation(source, model, graph, diagnostics.sorted())
 
 

@@ -50,4 +50,8 @@ CODES: dict[str, Code] = {
     "no-light": Code("info", "A scene without a light shows ambient light only."),
     "colour-range": Code("info", "A colour whose components look like 0 to 255 instead of 0 to 1."),
     "radians": Code("info", "An angle that looks like radians; angles are degrees."),
+    # what the derivation meets, and limits
+    "limit": Code("error", "A limit of the bytecode: values at a time, or draws in one application."),
+    "depth-limit": Code("error", "A path of the derivation that enters more symbols than the forecast follows."),
+    "state-limit": Code("info", "More states than the forecast counts."),
 }
