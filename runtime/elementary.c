@@ -437,16 +437,7 @@ double pl_pow(double a, double b) {
         return negative ? -0.0 : 0;
     if (fabs(estimate) < 0x1p-60)
         return negative ? -1 : 1;
-    /* b may be as large as 2^1023 and the logarithm as small as 2^-53: the product is taken of mantissas. */
-    int exponent;
-    const double mantissa = split(b, &exponent);
-    pair product = scale_by(log_size, mantissa);
-    for (; exponent > 900; exponent -= 900)
-        product = (pair){product.high * 0x1p900, product.low * 0x1p900};
-    for (; exponent < -900; exponent += 900)
-        product = (pair){product.high * 0x1p-900, product.low * 0x1p-900};
-    const double scale = power_of_two(exponent);
-    return exponential((pair){product.high * scale, product.low * scale}, negative);
+    return exponential(scale_by(log_size, b), negative); /* b < 2^63: a logarithm that isn't 0 is above 2^-54 */
 }
 
 /* --- rounding and comparing --- */
