@@ -106,6 +106,6 @@ def perpendiculars(axis: Vector) -> tuple[Vector, Vector]:
     z = scaled(axis, 1 / size)
     smallest = min(range(3), key=lambda i: abs(z[i]))
     seed = tuple(1.0 if i == smallest else 0.0 for i in range(3))
-    x = cross(seed, z)
+    x = difference(seed, scaled(z, z[smallest]))
     x = scaled(x, 1 / length(x))
     return x, cross(z, x)

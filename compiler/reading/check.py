@@ -82,7 +82,7 @@ class _Checker:
         said: set[tuple[int, int]] = set()
         for expression in all_expressions(self.model):
             try:
-                fold(expression, self.seed)
+                _divide_by_zero(fold(expression, self.seed))
             except NotFinite as error:
                 if error.span is not None and (error.span.start, error.span.end) not in said:
                     said.add((error.span.start, error.span.end))
@@ -215,6 +215,15 @@ class _Checker:
             for expression in (*(test for test, _ in way.guards), *way.weights, *getattr(way.leaf, "arguments", ())):
                 read |= reads(expression)
         return read | (set(self.model.parameters) - assigned)
+
+
+def _divide_by_zero(folded: Expression, lazy: bool = False) -> None:
+    """Raises NotFinite for what is divided by a constant 0, unless it is evaluated only sometimes."""
+    if isinstance(folded, Apply) and not lazy:
+        if folded.operation in ("divide", "modulo") and folded.arguments[1] == Constant(0.0):
+            raise NotFinite("division by zero", folded.span)
+        for i, argument in enumerate(folded.arguments):
+            _divide_by_zero(argument, folded.operation in ("and", "or", "select") and i > 0)
 
 
 def _finite_hint(reason: str) -> str:

@@ -204,7 +204,7 @@ class _Resolver:
     def once(self, block: syntax.Block, again: bool) -> None:
         if again:
             message = f"a second {block.name.name} block"
-            raise Problem("duplicate-name", block.name.span, message, "a scene has one; remove the other")
+            self.diagnostics.add("duplicate-name", block.name.span, message, "a scene has one; remove the other")
 
     def place(self, block: syntax.Block) -> None:
         for symbol, operand in split(self.objects.object(block)):

@@ -203,7 +203,8 @@ class Names:
         """What to say of a name that no definition of the scene has."""
         if taken := vocabulary.kind_of(name.name):
             message = f"'{name.name}' is {ARTICLES[taken]}, not {wanted}"
-            return Problem("wrong-kind", name.span, message, self._suggest(name, kinds))
+            hint = "perhaps a ';' is missing before it" if taken == "operation" else self._suggest(name, kinds)
+            return Problem("wrong-kind", name.span, message, hint)
         if name.name in vocabulary.UNSUPPORTED:
             return unsupported(name)
         hint = self._suggest(name, kinds) or nearest(name.name, self.entries)

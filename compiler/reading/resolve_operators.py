@@ -36,10 +36,9 @@ class Operators:
         made = []
         for statement in node.statements:
             try:
-                result = self._statement(statement)
-                if isinstance(result, Step) == calculates:
+                if _calculates(statement) not in (None, calculates):
                     raise self._misplaced(statement, calculates, node.name.name)
-                made.append(result)
+                made.append(self._statement(statement))
             except Problem as problem:
                 problem.report(self.names.diagnostics)
         if calculates:
@@ -136,3 +135,9 @@ class Operators:
         problem.hint = problem.hint or f"operations are {' '.join(vocabulary.OPERATIONS)}"
         return problem
 
+
+def _calculates(node: syntax.Statement) -> bool | None:
+    """Whether a statement belongs into a Calculation; None for an operation that there isn't."""
+    if isinstance(node, syntax.Assignment):
+        return True
+    return node.name.name == "variants" if node.name.name in vocabulary.OPERATIONS else None

@@ -1,0 +1,179 @@
+"""What is said about scenes: golden cases, and the checks' finer distinctions.
+
+``tests/cases/resolve/*.txt`` hold a scene, a line ``----``, and the messages it gets; ``PLSYS_BLESS=1`` rewrites
+the messages. Files that cases include stand in ``tests/cases/resolve/files``.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from model_text import codes, read
+from plsys.compiler.reading.check import check
+from plsys.compiler.reading.codes import CODES
+from plsys.compiler.reading.diagnostics import render
+from plsys.compiler.reading.parse import parse
+from plsys.compiler.reading.resolve import resolve
+from plsys.compiler.reading.source import Source
+
+FOLDER = Path(__file__).resolve().parents[2] / "cases/resolve"
+CASES = sorted(FOLDER.glob("*.txt"))
+SEPARATOR = "----\n"
+
+
+def report(scene: str) -> str:
+    """The messages for a scene that stands in the folder of cases' files."""
+    path = FOLDER / "files/scene.plsys"
+    source = Source("scene.plsys", scene.encode(), path)
+    file, diagnostics = parse(source)
+    model = resolve(file, diagnostics)
+    if not diagnostics.has_errors:
+        check(model, diagnostics)
+    text = "".join(render(item) + "\n" for item in diagnostics.sorted())
+    return text.replace(f"{path.parent}{os.sep}", "")
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_golden(path):
+    scene, _, expected = path.read_text(encoding="utf-8").partition(SEPARATOR)
+    found = report(scene)
+    if os.environ.get("PLSYS_BLESS"):
+        path.write_text(scene + SEPARATOR + found, encoding="utf-8")
+    else:
+        assert found == expected
+
+
+def test_there_are_cases():
+    assert len(CASES) > 30
+
+
+# Limits show when a scene is compiled or rendered, not when it is read.
+OURS = [code for code in list(CODES)[list(CODES).index("unknown-name") :] if "limit" not in code]
+
+
+@pytest.mark.parametrize("code", OURS)
+def test_every_code_has_a_case(code):
+    severity = CODES[code].severity
+    assert any(f"{severity}[{code}]" in path.read_text(encoding="utf-8") for path in CASES)
+
+
+COUNTED = "Selection A { [ n = 3 ] A; if (n > 0) A -> box + [ --n; trans 0 0 1 ] A; else A -> sphere; } object { A } "
+
+
+def test_a_good_scene_has_nothing_to_say():
+    assert codes(COUNTED) == []
+
+
+# --- read before assigned
+
+
+def test_assigned_on_every_path():
+    assert codes("Selection A(n) { if (n > 0) A -> [ k = n ] B; } Selection B { B -> cone(k); } object { A(2) }") == []
+
+
+def test_assigned_on_no_path():
+    text = "Calculation C { k = 1; } Selection A { A -> cone(k) + C box; } object { A }"
+    assert codes(text) == ["unassigned"]
+
+
+def test_assigned_on_some_path():
+    text = "Selection A { A -> B + [ k = 1 ] B; } Selection B { B -> cone(k); } object { A }"
+    assert codes(text) == ["maybe-unassigned"]
+
+
+def test_siblings_do_not_see_what_a_calculation_assigns():
+    assert codes("Selection A { A -> [ k = 1 ] cone(k) + cone(k); } object { A }") == ["unassigned"]
+
+
+def test_what_is_evaluated_only_sometimes_is_not_certain():
+    assert codes("Selection A { A -> [ k = 1 ] cone(k) + cone(rand(1) > 2 && k); } object { A }") == ["maybe-unassigned"]
+
+
+def test_a_read_for_a_dead_parameter_is_no_error():
+    assert "unassigned" not in codes("Calculation D { z1 = k; } Selection A { A -> D box + [ k = 1 ] cone(k); } object { A }")
+
+
+def test_arguments_are_in_the_callers_scope():
+    assert codes("Selection A(p, q) { A -> cone(p + q); } Selection B { B -> A(1, p); } object { B }") == ["unassigned"]
+
+
+# --- recursion
+
+
+def test_endless_recursion():
+    assert codes("Selection A { A -> box + [ trans 0 0 1 ] A; } object { A }") == ["endless"]
+    assert codes("Selection A { A -> B; } Selection B { B -> [ scale 0.5 ] A + box; } object { A }") == ["endless"]
+    assert codes("Selection A { A -> 1: A | 2: [ trans 0 0 1 ] A + box; } object { A }") == ["endless"]
+    assert codes("Selection A { if (1 > 0) A -> box + [ trans 0 0 1 ] A; else A -> box; } object { A }") == ["endless", "constant-guard"]
+    assert codes("Selection A { if (rand(1) < 1) A -> box + [ trans 0 0 1 ] A; else A -> box; } object { A }") == ["endless", "constant-guard"]
+
+
+def test_recursion_that_ends_by_weights_is_fine():
+    assert "endless" not in codes("Selection A { A -> 1: [ trans 0 0 1 ] A | 2: box; } object { A }")
+
+
+def test_figure_51s_loop_is_an_info():
+    text = "Selection A { if (rand(0) <= 0.8) A -> [ trans 0 0 1 ] box + A; else A -> disc; } object { A }"
+    assert codes(text) == ["random-loop"]
+
+
+def test_a_counter_that_nothing_changes():
+    assert codes(COUNTED.replace("--n; ", "")) == ["counter"]
+
+
+def test_a_cycle_that_changes_nothing():
+    assert codes(COUNTED.replace("[ --n; trans 0 0 1 ] ", "")) == ["identity-cycle"]
+
+
+def test_an_unplaced_endless_selection_is_only_unreachable():
+    assert codes(COUNTED + "Selection B { B -> B; }") == ["unreachable"]
+
+
+# --- numbers
+
+
+def test_a_division_that_is_never_reached_is_no_error():
+    assert codes("Parameter n = 0; Selection A { A -> cone(n > 0 ? 1/n : 1); } object { A }") == []
+
+
+def test_a_mesh_that_is_missing_or_broken(tmp_path):
+    for name, content in (("a.obj", b""), ("b.obj", b"\x00\xff garbage"), ("c.ply", b"ply\nnonsense"), ("d.stl", b"solid")):
+        (tmp_path / name).write_bytes(content)
+        path = tmp_path / "scene.plsys"
+        source = Source("scene.plsys", f'object {{ mesh("{name}") }}'.encode(), path)
+        file, diagnostics = parse(source)
+        resolve(file, diagnostics)
+        assert [item.code for item in diagnostics.items] == ["file"], name
+
+
+def test_a_mesh_keeps_its_triangles_and_normals(tmp_path):
+    plain = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
+    (tmp_path / "flat.obj").write_text(plain)
+    (tmp_path / "smooth.obj").write_text(plain.replace("f 1 2 3 4", "vn 0 0 1\nvn 0 1 1\nf 1//1 2//2 3//1"))
+    source = Source("scene.plsys", b'object { mesh("flat.obj") } object { mesh("smooth.obj") } object { mesh("flat.obj") }', tmp_path / "s.plsys")
+    file, diagnostics = parse(source)
+    model = resolve(file, diagnostics)
+    assert diagnostics.items == []
+    flat, smooth = model.meshes
+    assert (flat.vertices.shape, flat.triangles.shape, len(flat.normals)) == ((4, 3), (2, 3), 0)
+    assert smooth.triangles.shape == smooth.normal_triangles.shape == (1, 3)
+    assert smooth.normals[smooth.normal_triangles[0]].tolist() == [[0, 0, 1], [0, 1, 1], [0, 0, 1]]
+
+
+def test_an_editors_open_files_are_what_is_included(tmp_path):
+    opened = {tmp_path / "lib.plsys": "#declare R = 2;"}
+
+    def loader(path):
+        return Source(path.name, opened[path].encode(), path)
+
+    file, diagnostics = parse(Source("scene.plsys", b'#include "lib.plsys" sphere { 0, R }', tmp_path / "scene.plsys"))
+    model = resolve(file, diagnostics, loader=loader)
+    assert diagnostics.items == [] and model.files == [tmp_path / "scene.plsys", tmp_path / "lib.plsys"]
+
+
+@pytest.mark.parametrize("text", ["object { }", "union { }", "sphere { }", "camera { location }", "#declare A = texture { }", "mesh { }"])
+def test_empty_things_never_crash(text):
+    read(text)
