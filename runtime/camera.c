@@ -13,31 +13,28 @@ static void scale(double v[3], double factor)
     for (int axis = 0; axis < 3; axis++) v[axis] *= factor;
 }
 
+static double length(const double v[3])
+{
+    double copy[3] = {v[0], v[1], v[2]};
+    return pl_normalize(copy);
+}
+
 /* Turns the camera towards the record's look_at: the lengths and the handedness of the frame stay. */
 static bool look_at(const double *record, pl_camera *camera, pl_error *error)
 {
     const double *sky = record + PL_CAMERA_SKY;
-    double old_forward[3], old_right[3], normal[3];
-    memcpy(old_forward, camera->forward, sizeof old_forward);
-    memcpy(old_right, camera->right, sizeof old_right);
+    double normal[3];
     pl_cross(camera->up, camera->forward, normal);
     const double handedness = pl_dot(normal, camera->right) > 0.0 ? 1.0 : -1.0;
-    const double forward_length = pl_normalize(old_forward), right_length = pl_normalize(old_right);
-    double up_length;
-    {
-        double up[3];
-        memcpy(up, camera->up, sizeof up);
-        up_length = pl_normalize(up);
-    }
+    const double forward_length = length(camera->forward), right_length = length(camera->right);
+    const double up_length = length(camera->up);
     for (int axis = 0; axis < 3; axis++)
         camera->forward[axis] = record[PL_CAMERA_LOOK_AT + axis] - camera->location[axis];
     if (pl_normalize(camera->forward) == 0.0)
         return pl_fail(error, PL_ERROR_SCENE, "camera", "location and look_at are the same point");
     pl_cross(sky, camera->forward, camera->right);
-    /* Straight up or down: sky says nothing, and `right` stays as given. */
-    const bool along_sky = fabs(camera->right[0]) < 1e-10 && fabs(camera->right[1]) < 1e-10 &&
-                           fabs(camera->right[2]) < 1e-10;
-    if (along_sky || pl_normalize(camera->right) == 0.0) memcpy(camera->right, old_right, sizeof old_right);
+    if (pl_normalize(camera->right) == 0.0)
+        return pl_fail(error, PL_ERROR_SCENE, "camera", "it looks straight along sky");
     pl_cross(camera->forward, camera->right, camera->up);
     pl_normalize(camera->up);
     scale(camera->forward, forward_length);
@@ -56,20 +53,19 @@ bool pl_camera_create(const double *record, pl_camera *camera, pl_error *error)
     memcpy(camera->up, record + PL_CAMERA_UP, sizeof camera->up);
     if (record[PL_CAMERA_HAS_LOOK_AT] != 0.0 && !look_at(record, camera, error)) return false;
     const double angle = record[PL_CAMERA_ANGLE];
-    double right[3], up[3], forward[3];
-    memcpy(right, camera->right, sizeof right);
-    memcpy(up, camera->up, sizeof up);
-    const double right_length = pl_normalize(right);
     if (angle != 0.0) {
         if (!(angle > 0.0 && angle < 180.0))
             return pl_fail(error, PL_ERROR_SCENE, "camera", "angle is %g degrees, not between 0 and 180", angle);
         pl_normalize(camera->forward);
-        scale(camera->forward, right_length / pl_tan(angle / 2.0) / 2.0);
+        scale(camera->forward, length(camera->right) / pl_tan(angle / 2.0) / 2.0);
     }
-    memcpy(forward, camera->forward, sizeof forward);
-    if (right_length == 0.0 || pl_normalize(up) == 0.0 || pl_normalize(forward) == 0.0 ||
-        !pl_finite(camera->forward) || !pl_finite(camera->right) || !pl_finite(camera->up))
-        return pl_fail(error, PL_ERROR_SCENE, "camera", "direction, right and up must be vectors of finite, positive length");
+    if (length(camera->forward) == 0.0 || length(camera->right) == 0.0 || length(camera->up) == 0.0)
+        return pl_fail(error, PL_ERROR_SCENE, "camera",
+                       "direction, right and up must be vectors of finite, positive length");
+    double across[3];
+    pl_cross(camera->up, camera->forward, across);
+    if (!(fabs(pl_dot(across, camera->right)) > 0.0))
+        return pl_fail(error, PL_ERROR_SCENE, "camera", "direction, right and up lie in one plane");
     return true;
 }
 
