@@ -46,8 +46,7 @@ def svg(picture: Diagram, title: str = "") -> str:
         parts.append(_back(edge, placed, *lanes[index]) if edge.is_back else _edge(picture, edge, placed, bends))
     for edge, bends in zip(picture.edges, placed.bends):
         parts.append(_text("guard", bends[0][0], bends[0][1] + 4, edge.label) if bends else "")
-    reentered = {edge.target for edge in picture.edges if edge.is_back}
-    parts += [_node(node, *at, i in reentered) for i, (node, at) in enumerate(zip(picture.nodes, placed.position))]
+    parts += [_node(node, *at) for node, at in zip(picture.nodes, placed.position)]
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
@@ -74,15 +73,14 @@ def _extent(picture: Diagram, index: int) -> tuple[float, float]:
     return RADIUS, RADIUS + (6 + _width(node.label) if node.label else 0)
 
 
-def _node(node: Node, x: float, y: float, is_reentered: bool) -> str:
-    """Names stand to the right; where cycles come in from there, above it."""
+def _node(node: Node, x: float, y: float) -> str:
     if not node.letter:
         half = _width(node.label) / 2 + 8
         return (
             f'<rect class="node" x="{x - half:.1f}" y="{y - 12:.1f}" width="{2 * half:.1f}" height="24" rx="5" '
             f'fill="#f3f4f6"/><text class="name object" x="{x:.1f}" y="{y + 4:.1f}">{escape(node.label)}</text>'
         )
-    name = _text("name", x + RADIUS + (1 if is_reentered else 5), y - (9 if is_reentered else -4), node.label)
+    name = _text("name", x + RADIUS + 5, y + 4, node.label)
     return (
         f'<circle class="node" cx="{x:.1f}" cy="{y:.1f}" r="{RADIUS}" fill="{COLOURS.get(node.letter, "#ffffff")}"/>'
         f'<text class="letter" x="{x:.1f}" y="{y + 5.3:.1f}">{escape(node.letter)}</text>{name}'
@@ -152,16 +150,18 @@ def _lanes(picture: Diagram, placed: Layout) -> dict[int, tuple[float, float]]:
 
 
 def _back(edge: Edge, placed: Layout, lane: float, drop: float) -> str:
-    """Down out of the source, around the outside, and into the target from the side."""
+    """Down out of the source, around the outside between the layers, and into the target from above."""
     (sx, sy), (tx, ty) = placed.position[edge.source], placed.position[edge.target]
     side = -1 if lane < sx else 1
-    corner = 9.0
-    floor = sy + drop
+    corner = 8.0
+    floor, ceiling = sy + drop, ty - RADIUS - 10
+    entry = tx + side * 10
+    tip = entry, ty - (RADIUS**2 - 100) ** 0.5 - 1
     path = (
-        f"M{sx:.1f},{sy + RADIUS:.1f} L{sx:.1f},{floor - corner + 2:.1f} Q{sx:.1f},{floor:.1f} {sx + side * corner:.1f},{floor:.1f} "
+        f"M{sx:.1f},{sy + RADIUS:.1f} L{sx:.1f},{floor - corner + 2:.1f} "
+        f"Q{sx:.1f},{floor:.1f} {sx + side * corner:.1f},{floor:.1f} "
         f"L{lane - side * corner:.1f},{floor:.1f} Q{lane:.1f},{floor:.1f} {lane:.1f},{floor - corner:.1f} "
-        f"L{lane:.1f},{ty + corner:.1f} Q{lane:.1f},{ty:.1f} {lane - side * corner:.1f},{ty:.1f} "
-        f"L{tx + side * (RADIUS + 1):.1f},{ty:.1f}"
+        f"L{lane:.1f},{ceiling + corner:.1f} Q{lane:.1f},{ceiling:.1f} {lane - side * corner:.1f},{ceiling:.1f} "
+        f"L{entry + side * corner:.1f},{ceiling:.1f} Q{entry:.1f},{ceiling:.1f} {tip[0]:.1f},{tip[1]:.1f}"
     )
-    tip = (tx + side * (RADIUS + 1), ty)
-    return f'<path class="back" d="{path}"/>' + _head("turn", tip, (tip[0] + side, ty))
+    return f'<path class="back" d="{path}"/>' + _head("turn", tip, (entry, tip[1] - 1))
