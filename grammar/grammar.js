@@ -46,6 +46,16 @@ const DIRECTIVE_LINE = [
 // Bracketed text in a line, up to three deep.
 const BRACKETS = [1, 2].reduce((inner) => `\\(([^()\\r\\n]|${inner})*\\)`, '\\([^()\\r\\n]*\\)');
 
+const WORD_CHARACTERS = '0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ_abcdefghijklmnopqrstuvwxyz';
+
+/** A regular expression for all words but `words`: tree-sitter's have no look-ahead. */
+function wordsBut(words) {
+  const heads = [...new Set(words.map((word) => word[0]))].filter(Boolean);
+  const others = [...WORD_CHARACTERS].filter((character) => !heads.includes(character)).join('');
+  const longer = heads.map((head) => head + wordsBut(words.filter((word) => word[0] === head).map((word) => word.slice(1))));
+  return `(${[`[${others}][A-Za-z0-9_]*`, ...longer].join('|')})${words.includes('') ? '' : '?'}`;
+}
+
 const oneOf = (rules) => (rules.length > 1 ? choice(...rules) : rules[0]);
 
 /** Binary expressions over `operand`, one alternative a level of precedence. */
@@ -95,10 +105,10 @@ export default grammar({
 
     // --- scene blocks
 
-    include: ($) => prec.right(seq('#include', optional(field('path', $.string)), optional(';'))),
+    include: ($) => prec.right(seq(alias(/#[ \t]*include/, '#include'), optional(field('path', $.string)), optional(';'))),
 
     declare: ($) => prec.right(seq(
-      field('keyword', choice('#declare', '#local')),
+      field('keyword', choice(alias(/#[ \t]*declare/, '#declare'), alias(/#[ \t]*local/, '#local'))),
       optional(seq(
         field('name', $.name),
         optional('='),
@@ -323,7 +333,7 @@ export default grammar({
     directive: (_) => token(choice(
       new RegExp(`#[ \\t]*(${DIRECTIVE_WITH_BRACKETS.join('|')})([ \\t]+[A-Za-z0-9_]+)?[ \\t]*${BRACKETS}`),
       new RegExp(`#[ \\t]*(${DIRECTIVE_LINE.join('|')})([^A-Za-z0-9_\\r\\n][^\\r\\n]*)?`),
-      /#[ \t]*[A-Za-z0-9_]*/,
+      new RegExp(`#[ \\t]*${wordsBut(['declare', 'include', 'local'])}`),
     )),
   },
 });

@@ -99,8 +99,8 @@ _DIRECTIVES = ("declare", "include")
 
 
 def clean(source: Source, diagnostics: Diagnostics) -> bytes:
-    """The bytes to parse: like the source's, but with spaces for a byte order mark, for NUL bytes and for bytes
-    that aren't UTF-8 (both reported, at the first one), so that every offset stays what it is."""
+    """The bytes to parse: like the source's, but with spaces for a byte order mark, for NUL bytes and for
+    bytes that aren't UTF-8 (both reported, at the first one), so that every offset stays what it is."""
     data = source.data
     if data.startswith(BYTE_ORDER_MARK):
         data = b"   " + data[len(BYTE_ORDER_MARK) :]
@@ -125,10 +125,17 @@ def extras(reading: Reading, tree: Tree) -> None:
     from tree_sitter import Query, QueryCursor
 
     found = QueryCursor(Query(language(), "(directive) @directive")).captures(tree.root_node)
-    seen = False
-    for node in sorted(found.get("directive", []), key=lambda node: node.start_byte):
-        _directive(reading, node, seen)
-        seen = True
+    directives = sorted(found.get("directive", []), key=lambda node: node.start_byte)
+    # What follows a directive in its line may be its arguments.
+    rows = {reading.span(node).start_position.line: node.end_byte for node in reversed(directives)}
+    items = reading.diagnostics.items
+    items[:] = [
+        item
+        for item in items
+        if item.span.start < rows.get(item.span.start_position.line, item.span.start + 1)
+    ]
+    for i, node in enumerate(directives):
+        _directive(reading, node, i > 0)
     last = tree.root_node.children[-1] if tree.root_node.children else None
     while last is not None and last.type != "comment":
         last = last.children[-1] if last.children else None
@@ -154,9 +161,6 @@ def _directive(reading: Reading, node: Node, seen: bool) -> None:
         reading.complain(
             span, "a directive's name is missing after this '#'", "plsys has #declare and #include"
         )
-        return
-    if word[1] in _DIRECTIVES:
-        reading.complain(span, "a space stands between '#' and the directive's name", f"write #{word[1]}")
         return
     hint = nearest(f"#{word[1]}", [f"#{each}" for each in _DIRECTIVES])
     hint = hint or _INSTEAD.get(word[1], "remove it; plsys has #declare and #include")
@@ -240,13 +244,13 @@ def unexpected(reading: Reading, node: Node, context: Node | None = None) -> Dia
     match = re.search(r'"[^"]*"|#?\w+|[^\w\s]+', reading.text(node)) or re.search(r"\s*", text)
     hint = _expected(context or node.parent)
     span = _part(reading, node, match)
-    if _OPERATOR.fullmatch(match[0]) and re.match(rb"\s*([;)}\],]|$)", reading.data[span.end :]):
+    if _OPERATOR.fullmatch(match[0]) and re.match(rb"[ \t]*([;)}\],\r\n]|$)", reading.data[span.end :]):
         return _diagnostic("missing", span, f"nothing stands after this '{match[0]}'", hint)
     return _diagnostic("syntax", span, f"'{match[0][:30]}' is unexpected here", hint)
 
 
 def _last_open(text: str) -> int:
-    """Where the innermost round, square or curly bracket stands that ``text`` opens and doesn't close, or -1."""
+    """Where the innermost bracket of ``( [ {`` stands that ``text`` opens and doesn't close, or -1."""
     open_brackets: list[int] = []
     for i, character in enumerate(text):
         if character in "([{":
@@ -263,7 +267,7 @@ def _part(reading: Reading, node: Node, match: re.Match[str]) -> Span:
 
 
 def unmatched_bracket(reading: Reading, tree: Tree) -> Diagnostic | None:
-    """The innermost bracket that is never closed, for a text of which the parser could make nothing at all."""
+    """The innermost bracket that is never closed, for a text of which the parser could make nothing."""
     open_brackets: list[Node] = []
     cursor = tree.walk()
     while True:

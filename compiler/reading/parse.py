@@ -29,15 +29,16 @@ MAX_MESSAGES = 10
 
 
 def parse(source: Source) -> tuple[syntax.File, Diagnostics]:
-    """The syntax tree of ``source``, and the syntax errors in file order. Never raises for what the text holds."""
+    """The syntax tree of ``source``, and its syntax errors in file order. Never raises for what it holds."""
     diagnostics = Diagnostics()
     text = mistakes.clean(source, diagnostics)
     return convert(source, text, syntax_tree(text), diagnostics), diagnostics
 
 
 def convert(source: Source, text: bytes, tree: Tree, diagnostics: Diagnostics) -> syntax.File:
-    """The syntax tree from tree-sitter's tree of ``text``, which is ``mistakes.clean(source, …)``; syntax errors go to
-    ``diagnostics``. For callers that keep the tree up to date by ``grammar.syntax_tree(text, old_tree)``."""
+    """The syntax tree from tree-sitter's tree of ``text``, which is ``mistakes.clean(source, …)``; syntax
+    errors go to ``diagnostics``. For callers that keep the tree up to date, by
+    ``grammar.syntax_tree(text, old_tree)``."""
     reader = _FileReader(source, text, diagnostics)
     reader.file(tree)
     mistakes.extras(reader.reading, tree)
@@ -52,8 +53,8 @@ class _FileReader:
         self.reading = Reading(source, text, diagnostics)
         self.reader = DefinitionReader(self.reading)
         self.definitions: list[syntax.Definition] = []
-        # The last definition that broke: what follows it, up to the next one that starts a line no deeper, may be
-        # its debris, of which nothing is said.
+        # The last definition that broke: what follows it, up to the next one that starts a line no deeper,
+        # may be its debris, of which nothing is said.
         self.broken: Node | None = None
 
     def file(self, tree: Tree) -> None:
@@ -68,7 +69,7 @@ class _FileReader:
             items.append(found or mistakes.unexpected(self.reading, tree.root_node))
 
     def definition(self, node: Node) -> list[Node]:
-        """Read one child of the file's root; returns nodes inside of it that are to be read as definitions."""
+        """Read one child of the file's root; returns nodes in it that are to be read like it."""
         if self.broken is not None:
             if node.type not in DEFINITIONS or not self.starts_afresh(node):
                 return []
@@ -140,8 +141,8 @@ class _FileReader:
         return following.type == "stray" and self.reading.text(following) in (")", "]")
 
     def report_break(self, node: Node, before: int, end: int | None) -> None:
-        """Add the place where ``node`` breaks to its messages, from ``before`` on, and leave out those that may
-        only follow from it: later ones, and braces that the broken text may have swallowed."""
+        """Add the place where ``node`` breaks to its messages, from ``before`` on, and leave out those that
+        may only follow from it: later ones, and braces that the broken text may have swallowed."""
         items = self.reading.diagnostics.items
         found = mistakes.first_error(self.reading, node, end)
         if found is None:

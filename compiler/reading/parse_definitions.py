@@ -38,8 +38,8 @@ class DefinitionReader:
         self.hoisted: list[Node] = []
 
     def read(self, node: Node) -> syntax.Definition | None:
-        """The definition at ``node``, whose type is in DEFINITIONS; None if it is too broken to be of use. Raises
-        Abandon."""
+        """The definition at ``node``, whose type is in DEFINITIONS; None if it is too broken to be of use.
+        Raises Abandon."""
         return DEFINITIONS[node.type](self, node)
 
     # --- scene blocks
@@ -273,8 +273,8 @@ class DefinitionReader:
     def inside(self, body: Node) -> list[Node]:
         """The children of a body in braces that belong to it.
 
-        A body that is never closed swallows what follows, so there a block at the start of a line is taken to be a
-        definition of its own: one missing brace costs no neighbour."""
+        A body that is never closed swallows what follows, so there a block at the start of a line is taken to
+        be a definition of its own: one missing brace costs no neighbour."""
         children = body.children
         if children[-1].type == "}" and not children[-1].is_missing:
             return children
@@ -286,9 +286,12 @@ class DefinitionReader:
         return children[:own]
 
     def unclosed_brace(self, body: Node, last: Node) -> int:
-        """Where the brace stands that is to blame for an unclosed body, whose last child is ``last``: if the '}' of a
-        block in it starts a line further left than the block's own line does, it was meant for the body."""
-        while last.children:
+        """Where the brace stands that is to blame for an unclosed body, whose last child is ``last``: if the
+        '}' of a block in it starts a line further left than the block's own line does, it was meant for the
+        body."""
+        for _ in range(MAX_DEPTH):
+            if not last.children:
+                break
             last = last.children[-1]
             if last.type == "block_body" and last.children[-1].type == "}":
                 closer = last.children[-1]

@@ -1,7 +1,7 @@
 """The inside of a Selection: entry action, guards and rules.
 
-The grammar gives them flat, as they stand in the text; this module binds each ``else`` to the nearest ``if`` and
-puts right what it can of missing semicolons and arrows.
+The grammar gives them flat, as they stand in the text; this module binds each ``else`` to the nearest ``if``
+and puts right what it can of missing semicolons and arrows.
 
 Example: ``if (n > 0) A -> x A; else A -> x;`` is guard, rule, guard, rule, and becomes
 ``If(n > 0, Rule(A, …), Rule(A, …))``.
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class _Piece(NamedTuple):
-    """One thing in a Selection's body. ``kind`` is if (value: the test), else, rule or entry (value: the node)."""
+    """One thing in a Selection's body. ``kind`` is if (its test), else, rule, or entry (its Union)."""
 
     kind: str
     span: Span
@@ -35,7 +35,8 @@ class _Piece(NamedTuple):
 def selection_body(
     reading: Reading, nodes: list[Node], own_name: str, block: Callable[[Node, int], syntax.Block]
 ) -> tuple[syntax.Term | None, list[syntax.Production]]:
-    """Entry action and productions among ``nodes``, children of a ``selection_body``. ``block`` reads a scene block inside a rule."""
+    """Entry action and productions among ``nodes``, children of a ``selection_body``. ``block`` reads a scene
+    block inside a rule."""
     return _Body(reading, own_name, block).read(nodes)
 
 
@@ -241,7 +242,7 @@ class _Body:
     def take_last(
         union: syntax.Union | None,
     ) -> tuple[syntax.Name | syntax.Call | None, syntax.Union | None, int | None]:
-        """The last item of ``union`` if it can be a rule's name, the union without it, and where that ends."""
+        """The last item of ``union`` if it can be a rule's name, the union without it, and its end."""
         if union is None:
             return None, None, None
         *terms, term = union.terms

@@ -73,7 +73,7 @@ def _split_lines(reading: Reading, parts: list[Node]) -> list[tuple[int, int]]:
         begins_line = parts[i].start_point[0] > parts[i - 1].end_point[0]
         if begins_line and parts[i].type == "name" and parts[i].start_point[1] <= column:
             starts.append(i)
-    return list(zip(starts, [*starts[1:], len(parts)]))
+    return list(zip(starts, [*starts[1:], len(parts)], strict=True))
 
 
 def _one_operation(reading: Reading, parts: list[Node]) -> syntax.Operation:

@@ -1,7 +1,8 @@
 """Expressions: nodes of tree-sitter's tree → nodes of :mod:`syntax`.
 
-The grammar accepts common mistakes; each is explained here, where it is read, and read on as what was probably
-meant. What can't be used at all (a gap that tree-sitter filled in) becomes None and is left out by the caller.
+The grammar accepts common mistakes; each is explained here, where it is read, and read on as what was
+probably meant. What can't be used at all (a gap that tree-sitter filled in) becomes None and is left out by
+the caller.
 
 Example::
 
@@ -22,8 +23,8 @@ from .source import Source, Span
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-# Brackets, operators, blocks and guards nest no deeper, so that this and all later stages, which recurse with up to
-# five frames a level, stay below Python's own limit of 1000.
+# Brackets, operators, blocks and guards nest no deeper, so that this and all later stages, which recurse with
+# up to five frames a level, stay below Python's own limit of 1000.
 MAX_DEPTH = 128
 
 _NUMBER = re.compile(r"\d+(\.\d+)?([eE][+-]?\d+)?")
@@ -32,7 +33,7 @@ _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 
 
 class Abandon(Exception):
-    """Raised where nothing more can be made of a definition: it is left out, and this is all that is said of it."""
+    """Raised where nothing more can be made of a definition: it is left out, and only this is said of it."""
 
     def __init__(self, span: Span, message: str, hint: str) -> None:
         self.span, self.message, self.hint = span, message, hint
@@ -46,8 +47,8 @@ class TooDeep(Abandon):
 
 
 class Reading:
-    """One file being read: its text (the bytes that were parsed), what is said about it, and the shorthands that all
-    readers use."""
+    """One file being read: its text (the bytes that were parsed), what is said about it, and the shorthands
+    that all readers use."""
 
     def __init__(self, source: Source, text: bytes, diagnostics: Diagnostics) -> None:
         self.source, self.data, self.diagnostics = source, text, diagnostics
@@ -75,11 +76,14 @@ class Reading:
         return Span(self.source, offset, offset)
 
     def need_semicolon(self, node: Node, what: str) -> None:
-        """Complain unless ``node`` ends with ';' (perhaps inside of a string or bracket that is never closed)."""
-        following = node.next_sibling
-        if following is not None and following.type in ("stray", "ERROR"):
-            return  # which is the mistake
-        if self.data[node.end_byte - 1 : node.end_byte] != b";":
+        """Complain unless ``node`` ends with ';' (or its unclosed string or bracket does)."""
+        if self.data[node.end_byte - 1 : node.end_byte] == b";":
+            return
+        # A stray token where the ';' belongs is a mistake of its own.
+        last, following = node, node.next_sibling
+        while last.children:
+            last = last.children[-1]
+        if not is_stray(last) and (following is None or following.type not in ("stray", "ERROR")):
             self.missing_semicolon(node.end_byte, what)
 
     def missing_semicolon(self, offset: int, what: str) -> None:
@@ -181,7 +185,7 @@ def _malformed_number(reading: Reading, node: Node, text: str) -> syntax.Number:
 
 
 def string(reading: Reading, node: Node | None, depth: int = 0) -> syntax.String | None:
-    """The text between the quotes. Escapes are ``\\"``, ``\\\\``, ``\\n`` and ``\\t``; another backslash is itself."""
+    """The text between the quotes; ``\\"`` ``\\\\`` ``\\n`` ``\\t`` are escapes, any other backslash is itself."""
     if node is None or node.is_missing:
         return None
     text = reading.text(node)

@@ -1,6 +1,6 @@
 """The grammar's corpus (grammar/test/corpus), run without tree-sitter's command line.
 
-A case is a title between lines of ``=``, a text, a line of ``-`` and the tree with field names; with ``:error``
+A case is a title between lines of ``=``, a text, a line of ``-`` and the tree with field names; with `:error`
 under its title only that the tree has an error. ``PLSYS_BLESS=1`` rewrites the trees.
 """
 
@@ -96,7 +96,9 @@ def test_queries_fit_the_grammar(path: Path) -> None:
 def test_highlights_tell_what_things_are() -> None:
     from tree_sitter import Query, QueryCursor
 
-    text = b'Selection Tree { if (n > 0) Tree -> C_x T_y cylinder; } // end\nParameter n = 1 "age";\ncamera { angle 45 }'
+    text = b"""Selection Tree { if (n > 0) Tree -> C_x T_y cylinder; } // end
+        Parameter n = 1 "age";
+        camera { angle 45 }"""
     query = Query(language(), (GRAMMAR / "queries/highlights.scm").read_text())
     captures = QueryCursor(query).captures(syntax_tree(text).root_node)
     found = {

@@ -1,6 +1,7 @@
 """Text → syntax tree, and what is said about text that isn't one.
 
-``tests/cases/syntax/*.txt`` hold a scene, a line ``----``, and its messages; ``PLSYS_BLESS=1`` rewrites those.
+``tests/cases/syntax/*.txt`` hold a scene, a line ``----``, and its messages;
+``PLSYS_BLESS=1`` rewrites those.
 """
 
 from __future__ import annotations
@@ -287,9 +288,9 @@ def test_many_unclosed_blocks_stay_apart() -> None:
 
 
 PIECES = st.sampled_from(
-    "Selection Calculation Transformation Texture Parameter if else elseif #declare #include #while A B camera "
-    '{ } ( ) [ ] < > ; , : = -> => + - * / -- ++ -= | ? && == 1 2.5 .5 5. 2x 1e3 " "s" // /* */ @ é − \n \t \r '
-    "\0 rgb texture to for".split(" ")
+    "Selection Calculation Transformation Texture Parameter if else elseif #declare #include #while A B "
+    "camera rgb texture to for 1 2.5 .5 5. 2x 1e3 { } ( ) [ ] < > ; , : = -> => + - * / -- ++ -= | ? && == "
+    '" "s" // /* */ @ é − \n \t \r \0'.split(" ")
 )
 
 
