@@ -32,6 +32,7 @@ static bool narrow_to_side(double k, const double o[3], const double d[3], pl_ro
     double c = o[0] * o[0] + o[1] * o[1] - w_o * w_o;
     double xw = o[0] * w_d - w_o * d[0], yw = o[1] * w_d - w_o * d[1], xy = o[0] * d[1] - o[1] * d[0];
     double discriminant = xw * xw + yw * yw - xy * xy;
+    if (isnan(a) || isnan(b) || isnan(c)) return false;
     if (a > 0.0) {
         if (!(discriminant >= 0.0)) return false;
         double q = -(b + copysign(sqrt(discriminant), b));
