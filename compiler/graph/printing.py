@@ -94,17 +94,15 @@ def print_expression(expression: Expression, strength: int = 0) -> str:
             return f"({text})" if text.startswith("-") and strength == ATOM else text
         case Read():
             return expression.parameter
-        case Apply("select"):
-            test, then, otherwise = expression.arguments
+        case Apply("select", (test, then, otherwise)):
             text = f"{print_expression(test, 1)} ? {print_expression(then)} : {print_expression(otherwise)}"
             return f"({text})" if strength > 0 else text
-        case Apply(operation) if operation in INFIX:
+        case Apply(operation, (left, right)) if operation in INFIX:
             sign, own = INFIX[operation]
-            left, right = expression.arguments
             text = f"{print_expression(left, own)} {sign} {print_expression(right, own + 1)}"
             return f"({text})" if strength > own else text
-        case Apply(operation) if operation in PREFIX:
-            text = PREFIX[operation] + print_expression(expression.arguments[0], ATOM)
+        case Apply(operation, (operand,)) if operation in PREFIX:
+            text = PREFIX[operation] + print_expression(operand, ATOM)
             return f"({text})" if strength > PREFIX_STRENGTH else text
         case Apply():
             return f"{expression.operation}({', '.join(map(print_expression, expression.arguments))})"

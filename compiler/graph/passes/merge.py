@@ -17,14 +17,21 @@ from ..matrices import is_finite, is_singular, multiply
 
 
 def merge(graph: g.Graph) -> None:
-    for node in graph.nodes:
-        if not isinstance(node, g.Transform) or is_singular(node.matrix):
+    absorbed: set[int] = set()
+    for i in list(graph.reachable()):  # outer ones first
+        node = graph.nodes[i]
+        if i in absorbed or not isinstance(node, g.Transform) or is_singular(node.matrix):
             continue
         while isinstance(inner := graph.nodes[node.child], g.Transform) and not is_singular(inner.matrix):
             product = tuple(value + 0.0 for value in multiply(node.matrix, inner.matrix))
             if not is_finite(product) or is_singular(product):
                 break
-            shown = [name or "[]" for name in (node.name, inner.name)]
-            graph.left_out.append(g.LeftOut(f"transformation {shown[1]}", f"merged into {shown[0]} before it"))
+            absorbed.add(node.child)
+            why = f"merged into {_shown(node)}, which stands before it"
+            graph.left_out.append(g.LeftOut(_shown(inner), why))
             node.name = "*".join(name for name in (node.name, inner.name) if name)
             node.matrix, node.child = product, inner.child
+
+
+def _shown(node: g.Transform) -> str:
+    return f"transformation {node.name}" if node.name else "an inline transformation"

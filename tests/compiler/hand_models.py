@@ -111,13 +111,16 @@ def start_symbol(body: Operand) -> str:
 
 def parameters_of(item: object) -> set[str]:
     """The names that anything below assigns or reads."""
-    if isinstance(item, (list, tuple)):
-        return set().union(*map(parameters_of, item))
-    if isinstance(item, (Assign, Read)):
-        return {item.parameter} | (parameters_of(item.value) if isinstance(item, Assign) else set())
-    if not hasattr(item, "__dataclass_fields__"):
-        return set()
-    return set().union(*(parameters_of(getattr(item, name)) for name in item.__dataclass_fields__ if "span" not in name))
+    names, pending = set(), [item]
+    while pending:
+        item = pending.pop()
+        if isinstance(item, (list, tuple)):
+            pending.extend(item)
+        elif isinstance(item, (Assign, Read)):
+            names.add(item.parameter)
+        if hasattr(item, "__dataclass_fields__"):
+            pending.extend(getattr(item, name) for name in item.__dataclass_fields__ if "span" not in name)
+    return names
 
 
 def tree(order: float = 10, decrement: float = 4.0, scale: float = 0.8) -> Model:
