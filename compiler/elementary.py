@@ -1,16 +1,16 @@
 """The language's pure and random functions with the runtime's own bits: numbers in, numbers out.
 
-A thin layer over libelementary, which is built from runtime/elementary.c: an ulp in a guard is another plant, so
-compiler, unfolder and runtime have one implementation. NumPy is imported only when an array comes in.
+A thin layer over libelementary, which is built from runtime/elementary.c: an ulp in a guard is another plant,
+so compiler, unfolder and runtime have one implementation. NumPy is imported only when an array comes in.
 
     >>> apply("sin", 30.0), sin(90.0), pow(2.0, 10.0)
     (0.5, 1.0, 1024.0)
-    >>> rand(mix(seed_key(7), name_hash("Tree")), bits(0.0), 0)  # the first draw of rand(0) under this key
+    >>> rand(mix(seed_key(7), name_hash("Tree")), bits(0.0), 0)  # the first draw of rand(0)
     0.7593427476879594
 
-Every function takes numbers or arrays: only numbers give a float or int, otherwise the arguments are broadcast against each
-other and an array comes back (float64; uint64 for keys, hashes and bits). Angles are in degrees. Nothing raises for a
-value out of a function's domain: the result is NaN or infinite, as in IEEE arithmetic.
+Every function takes numbers or arrays: only numbers give a float or int, else the arguments are broadcast
+against each other and an array comes back (float64; uint64 for keys, hashes and bits). Angles are in degrees.
+Nothing raises for a value out of a function's domain: the result is NaN or infinite, as in IEEE arithmetic.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ def _load() -> ctypes.CDLL:
     try:
         library = ctypes.CDLL(str(_LIBRARY))
     except OSError as error:
-        raise ImportError(f"{_LIBRARY.name} is missing or can't be loaded: build it with 'make dev' ({error})") from None
+        raise ImportError(
+            f"{_LIBRARY.name} is missing or can't be loaded: build it with 'make dev' ({error})"
+        ) from None
     double, size, u64, pointer = ctypes.c_double, ctypes.c_size_t, ctypes.c_uint64, ctypes.c_void_p
     for name, result, arguments in (
         ("pl_elementary", double, (ctypes.c_int, double, double, double)),
@@ -57,11 +59,11 @@ def _load() -> ctypes.CDLL:
 _library = _load()
 
 
-# --- pure functions ------------------------------------------------------------------------------------------------
+# --- pure functions ---
 
 
 def apply(operation: str, *values: float) -> float:
-    """The value of the opcode ``operation`` for as many numbers as it takes. KeyError if it isn't one of PURE."""
+    """The value of the opcode ``operation`` for the numbers it takes. KeyError if it isn't one of PURE."""
     row = _row(operation, len(values))
     return _library.pl_elementary(row.id, *map(float, values), *(0.0,) * (3 - len(values)))
 
@@ -91,7 +93,10 @@ def _broadcast(values, dtype) -> list:
     """C-contiguous arrays of one shape."""
     import numpy as np
 
-    return [np.ascontiguousarray(a) for a in np.broadcast_arrays(*(np.asarray(value, dtype=dtype) for value in values))]
+    return [
+        np.ascontiguousarray(a)
+        for a in np.broadcast_arrays(*(np.asarray(value, dtype=dtype) for value in values))
+    ]
 
 
 def _is_array(value: object) -> bool:
@@ -113,7 +118,7 @@ log = partial(_either, "log")
 pow = partial(_either, "pow")
 
 
-# --- random numbers (runtime/bytecode.toml, "random") ----------------------------------------------------------------
+# --- random numbers (runtime/bytecode.toml, "random") ---
 
 
 def name_hash(name: str) -> int:
@@ -128,8 +133,8 @@ def seed_key(seed: float) -> int:
 
 
 def mix(k, x):
-    """The key made of key ``k`` and the number ``x``, both unsigned 64-bit. Not the language's mix(a, b, t), which is
-    ``apply("mix", a, b, t)``."""
+    """The key made of key ``k`` and the number ``x``, both unsigned 64-bit. Not the language's mix(a, b, t),
+    which is ``apply("mix", a, b, t)``."""
     if not (_is_array(k) or _is_array(x)):
         return _one(_library.pl_mix_array, ctypes.c_uint64, (k, x))
     return _many(_library.pl_mix_array, (k, x), float_result=False)
@@ -162,7 +167,7 @@ def unit(x):
 
 
 def rand(key, stream_bits, ordinal):
-    """Draw number ``ordinal`` (from 0) on the stream with these bits in an application with this key: [0, 1)."""
+    """Draw number ``ordinal`` (from 0) on the stream with these bits under this application's key: [0, 1)."""
     if not any(map(_is_array, (key, stream_bits, ordinal))):
         return _one(_library.pl_rand_array, ctypes.c_double, (key, stream_bits, ordinal))
     return _many(_library.pl_rand_array, (key, stream_bits, ordinal), float_result=True)
@@ -185,7 +190,6 @@ def hash(seed_key: int, *arguments):
     return out
 
 
-
 def _uint64(value: int):
     import numpy as np
 
@@ -195,7 +199,9 @@ def _uint64(value: int):
 def _one(function, result_type, values):
     """A function on arrays of keys, for one number each."""
     result = result_type()
-    function(1, *(ctypes.byref(ctypes.c_uint64(int(value) & _MASK)) for value in values), ctypes.byref(result))
+    function(
+        1, *(ctypes.byref(ctypes.c_uint64(int(value) & _MASK)) for value in values), ctypes.byref(result)
+    )
     return result.value
 
 

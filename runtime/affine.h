@@ -12,12 +12,14 @@ typedef struct pl_affine {
     double m[12];
 } pl_affine;
 
-static inline pl_affine pl_affine_identity(void) {
+static inline pl_affine pl_affine_identity(void)
+{
     return (pl_affine){{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
 }
 
 /* a·b: b acts first. */
-static inline pl_affine pl_affine_multiply(const pl_affine *a, const pl_affine *b) {
+static inline pl_affine pl_affine_multiply(const pl_affine *a, const pl_affine *b)
+{
     pl_affine product;
     for (int r = 0; r < 3; r++) {
         const double *row = a->m + 4 * r;
@@ -30,7 +32,8 @@ static inline pl_affine pl_affine_multiply(const pl_affine *a, const pl_affine *
 }
 
 /* out may be p. */
-static inline void pl_affine_point(const pl_affine *a, const double p[3], double out[3]) {
+static inline void pl_affine_point(const pl_affine *a, const double p[3], double out[3])
+{
     const double x = p[0], y = p[1], z = p[2];
     for (int r = 0; r < 3; r++) {
         const double *row = a->m + 4 * r;
@@ -39,7 +42,8 @@ static inline void pl_affine_point(const pl_affine *a, const double p[3], double
 }
 
 /* Without the translation; out may be v. */
-static inline void pl_affine_vector(const pl_affine *a, const double v[3], double out[3]) {
+static inline void pl_affine_vector(const pl_affine *a, const double v[3], double out[3])
+{
     const double x = v[0], y = v[1], z = v[2];
     for (int r = 0; r < 3; r++) {
         const double *row = a->m + 4 * r;
@@ -47,15 +51,18 @@ static inline void pl_affine_vector(const pl_affine *a, const double v[3], doubl
     }
 }
 
-/* By the transposed linear part: with a the inverse of M this maps a normal by M (not to unit length). out may be n. */
-static inline void pl_affine_normal(const pl_affine *a, const double n[3], double out[3]) {
+/* By the transposed linear part: with a the inverse of M this maps a normal by M (not to unit length). out may be n.
+ */
+static inline void pl_affine_normal(const pl_affine *a, const double n[3], double out[3])
+{
     const double x = n[0], y = n[1], z = n[2];
     for (int c = 0; c < 3; c++)
         out[c] = a->m[c] * x + a->m[4 + c] * y + a->m[8 + c] * z;
 }
 
 /* Determinant of the linear part. */
-static inline double pl_affine_determinant(const pl_affine *a) {
+static inline double pl_affine_determinant(const pl_affine *a)
+{
     const double *m = a->m;
     return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
            m[2] * (m[4] * m[9] - m[5] * m[8]);
@@ -63,7 +70,8 @@ static inline double pl_affine_determinant(const pl_affine *a) {
 
 /* The inverse by the adjugate. false, with *inverse unspecified, if the map is singular: the determinant is 0 or an
  * entry of the inverse isn't finite. */
-static inline bool pl_affine_inverse(const pl_affine *a, pl_affine *inverse) {
+static inline bool pl_affine_inverse(const pl_affine *a, pl_affine *inverse)
+{
     const double *m = a->m;
     const double determinant = pl_affine_determinant(a);
     if (determinant == 0)

@@ -18,9 +18,9 @@
  *
  * Records show the values that differ from their defaults, whole vectors as <a, b>, then all entries. A node shows
  * its fields in file order: code by its first byte (`none` without code), cases as [@weight: node, …], shapes,
- * patterns and parameters by name; then its place, if it has one. Below the first node that uses a piece of code stands the
- * piece, an instruction a line: first byte, opcode, operand. A jump shows the byte that it leads to, texture_set
- * the value (diffuse, ambient[1], entry[0].red). Numbers are pl_number_text's. */
+ * patterns and parameters by name; then its place, if it has one. Below the first node that uses a piece of code
+ * stands the piece, an instruction a line: first byte, opcode, operand. A jump shows the byte that it leads to,
+ * texture_set the value (diffuse, ambient[1], entry[0].red). Numbers are pl_number_text's. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -38,7 +38,8 @@ typedef struct dump {
     bool failed;
 } dump;
 
-__attribute__((format(printf, 2, 3))) static void put(dump *d, const char *format, ...) {
+__attribute__((format(printf, 2, 3))) static void put(dump *d, const char *format, ...)
+{
     if (d->failed)
         return;
     va_list arguments, again;
@@ -62,13 +63,15 @@ __attribute__((format(printf, 2, 3))) static void put(dump *d, const char *forma
     va_end(again);
 }
 
-static void put_number(dump *d, double value) {
+static void put_number(dump *d, double value)
+{
     char buffer[PL_NUMBER_TEXT];
     put(d, "%s", pl_number_text(value, buffer));
 }
 
 /* "7" or "<1, 2, 3>". */
-static void put_vector(dump *d, const double *values, uint32_t count) {
+static void put_vector(dump *d, const double *values, uint32_t count)
+{
     if (count > 1)
         put(d, "<");
     for (uint32_t i = 0; i < count; i++) {
@@ -80,11 +83,13 @@ static void put_vector(dump *d, const double *values, uint32_t count) {
         put(d, ">");
 }
 
-static const char *parameter(const dump *d, uint32_t slot) {
+static const char *parameter(const dump *d, uint32_t slot)
+{
     return d->program->strings[d->program->parameters[slot]].text;
 }
 
-static void put_record(dump *d, uint32_t index) {
+static void put_record(dump *d, uint32_t index)
+{
     const pl_record *record = &d->program->records[index];
     const pl_record_row *row = pl_record_row_of(record->kind);
     put(d, "record %u %s", index, row->name);
@@ -106,7 +111,8 @@ static void put_record(dump *d, uint32_t index) {
     put(d, "\n");
 }
 
-static void put_texture_value(dump *d, uint32_t index) {
+static void put_texture_value(dump *d, uint32_t index)
+{
     uint32_t first, size;
     if (index >= PL_TEXTURE_VALUES) {
         const uint32_t entry = (index - PL_TEXTURE_VALUES) / PL_TEXTURE_ENTRY;
@@ -120,7 +126,8 @@ static void put_texture_value(dump *d, uint32_t index) {
 }
 
 /* A piece of code, if it hasn't been shown. */
-static void put_code(dump *d, uint32_t code) {
+static void put_code(dump *d, uint32_t code)
+{
     if (code == 0 || d->shown[code - 1])
         return;
     d->shown[code - 1] = 1;
@@ -155,14 +162,16 @@ static void put_code(dump *d, uint32_t code) {
     }
 }
 
-static void put_code_reference(dump *d, uint32_t code) {
+static void put_code_reference(dump *d, uint32_t code)
+{
     if (code)
         put(d, "@%u", code - 1);
     else
         put(d, "none");
 }
 
-static void put_field(dump *d, uint8_t type, const uint32_t *words) {
+static void put_field(dump *d, uint8_t type, const uint32_t *words)
+{
     const pl_program *program = d->program;
     switch (type) {
     case PL_FIELD_NODES:
@@ -191,7 +200,8 @@ static void put_field(dump *d, uint8_t type, const uint32_t *words) {
     }
 }
 
-static void put_node(dump *d, uint32_t index) {
+static void put_node(dump *d, uint32_t index)
+{
     const pl_program *program = d->program;
     const pl_node *node = &program->nodes[index];
     const pl_node_row *row = pl_node_row_of(node->kind);
@@ -217,7 +227,8 @@ static void put_node(dump *d, uint32_t index) {
     }
 }
 
-static void put_program(dump *d) {
+static void put_program(dump *d)
+{
     const pl_program *program = d->program;
     put(d, "bytecode version %d\n", PL_VERSION);
     for (uint32_t i = 0; i < program->parameter_count; i++)
@@ -233,7 +244,8 @@ static void put_program(dump *d) {
         put_node(d, i);
 }
 
-char *pl_disassemble(const void *bytecode, size_t length, pl_error *error) {
+char *pl_disassemble(const void *bytecode, size_t length, pl_error *error)
+{
     pl_error_clear(error);
     pl_program *program = pl_program_load(bytecode, length, error);
     if (!program)

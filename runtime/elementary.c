@@ -1,9 +1,9 @@
 /* elementary.c - see elementary.h.
  *
- * Method: arguments are reduced exactly, the function is evaluated as an unevaluated sum of two doubles ("double-double":
- * Dekker 1971) with a relative error below 2^-62, and rounded once. Of each Taylor series only the leading terms need
- * double-double; the rest, small enough, is a Horner scheme in double. Sources: Muller et al., Handbook of
- * Floating-Point Arithmetic, chapters 4, 5 and 11. */
+ * Method: arguments are reduced exactly, the function is evaluated as an unevaluated sum of two doubles
+ * ("double-double": Dekker 1971) with a relative error below 2^-62, and rounded once. Of each Taylor series only the
+ * leading terms need double-double; the rest, small enough, is a Horner scheme in double. Sources: Muller et al.,
+ * Handbook of Floating-Point Arithmetic, chapters 4, 5 and 11. */
 #include "elementary.h"
 
 #include <math.h>
@@ -12,8 +12,10 @@
 #include "bytecode.h"
 #include "random.h"
 
-#if defined __FAST_MATH__ || (__FLT_EVAL_METHOD__ != 0 && __FLT_EVAL_METHOD__ != 16) /* 16: only half precision is widened */
-#error "results must have the same bits everywhere: compile without -ffast-math, for a machine with IEEE double arithmetic"
+#if defined __FAST_MATH__ || \
+    (__FLT_EVAL_METHOD__ != 0 && __FLT_EVAL_METHOD__ != 16) /* 16: only half precision is widened */
+#error \
+    "results must have the same bits everywhere: compile without -ffast-math, for a machine with IEEE double arithmetic"
 #endif
 
 /* --- double-double --- */
@@ -23,46 +25,54 @@ typedef struct pair {
 } pair;
 
 /* a + b exactly, for |a| >= |b| or a = 0. */
-static inline pair fast_two_sum(double a, double b) {
+static inline pair fast_two_sum(double a, double b)
+{
     const double sum = a + b;
     return (pair){sum, b - (sum - a)};
 }
 
 /* a + b exactly. */
-static inline pair two_sum(double a, double b) {
+static inline pair two_sum(double a, double b)
+{
     const double sum = a + b, b_seen = sum - a;
     return (pair){sum, (a - (sum - b_seen)) + (b - b_seen)};
 }
 
 /* The upper 26 bits; for |a| < 2^996. */
-static inline double upper(double a) {
+static inline double upper(double a)
+{
     const double t = 0x1.0000002p27 * a;
     return t - (t - a);
 }
 
 /* a * b exactly, where nothing over- or underflows. */
-static inline pair two_product(double a, double b) {
+static inline pair two_product(double a, double b)
+{
     const double product = a * b, a1 = upper(a), b1 = upper(b), a2 = a - a1, b2 = b - b1;
     return (pair){product, ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2};
 }
 
-static inline pair add(pair a, pair b) {
+static inline pair add(pair a, pair b)
+{
     pair high = two_sum(a.high, b.high);
     const pair low = two_sum(a.low, b.low);
     high = fast_two_sum(high.high, high.low + low.high);
     return fast_two_sum(high.high, high.low + low.low);
 }
 
-static inline pair multiply(pair a, pair b) {
+static inline pair multiply(pair a, pair b)
+{
     const pair p = two_product(a.high, b.high);
     return fast_two_sum(p.high, p.low + (a.high * b.low + a.low * b.high));
 }
 
-static inline pair scale_by(pair a, double b) {
+static inline pair scale_by(pair a, double b)
+{
     return multiply(a, (pair){b, 0});
 }
 
-static inline pair divide(pair a, pair b) {
+static inline pair divide(pair a, pair b)
+{
     const double q1 = a.high / b.high;
     const pair p = scale_by(b, q1);
     const pair rest = add(a, (pair){-p.high, -p.low});
@@ -70,7 +80,8 @@ static inline pair divide(pair a, pair b) {
 }
 
 /* Newton's step from the double root. */
-static inline pair root(pair a) {
+static inline pair root(pair a)
+{
     if (a.high <= 0)
         return (pair){0, 0};
     const double r = sqrt(a.high);
@@ -79,31 +90,36 @@ static inline pair root(pair a) {
     return fast_two_sum(r, rest.high / (2 * r));
 }
 
-static inline pair negate(pair a) {
+static inline pair negate(pair a)
+{
     return (pair){-a.high, -a.low};
 }
 
 /* --- exponents --- */
 
-static inline uint64_t bits_of(double a) {
+static inline uint64_t bits_of(double a)
+{
     uint64_t bits;
     memcpy(&bits, &a, sizeof bits);
     return bits;
 }
 
-static inline double from_bits(uint64_t bits) {
+static inline double from_bits(uint64_t bits)
+{
     double a;
     memcpy(&a, &bits, sizeof a);
     return a;
 }
 
 /* 2^exponent for -1022 <= exponent <= 1023. */
-static inline double power_of_two(int exponent) {
+static inline double power_of_two(int exponent)
+{
     return from_bits((uint64_t)(exponent + 1023) << 52);
 }
 
 /* a = result * 2^*exponent with 1 <= |result| < 2, for finite a != 0. */
-static double split(double a, int *exponent) {
+static double split(double a, int *exponent)
+{
     int e = 0;
     if (fabs(a) < 0x1p-1022) {
         a *= 0x1p54;
@@ -115,7 +131,8 @@ static double split(double a, int *exponent) {
 }
 
 /* a * 2^exponent, rounded once, also to a denormal number, 0 or infinity. 2^-60 < |a.high| < 2^60. */
-static double join(pair a, int exponent) {
+static double join(pair a, int exponent)
+{
     if (exponent > 2000)
         exponent = 2000;
     if (exponent < -2000)
@@ -142,20 +159,23 @@ static double join(pair a, int exponent) {
 
 /* --- circular functions --- */
 
-static const pair RADIANS = {0x1.1df46a2529d39p-6, 0x1.5c1d8becdd291p-62};   /* pi / 180 */
-static const pair DEGREES = {0x1.ca5dc1a63c1f8p+5, -0x1.1e7ab456405f9p-49};  /* 180 / pi */
+static const pair RADIANS = {0x1.1df46a2529d39p-6, 0x1.5c1d8becdd291p-62};  /* pi / 180 */
+static const pair DEGREES = {0x1.ca5dc1a63c1f8p+5, -0x1.1e7ab456405f9p-49}; /* 180 / pi */
 static const pair THIRD = {0x1.5555555555555p-2, 0x1.5555555555555p-56};
 
 /* a * constant, rounded once, for every finite a != 0. */
-static double scaled(double a, pair constant) {
+static double scaled(double a, pair constant)
+{
     int exponent;
     const double mantissa = split(a, &exponent);
     return join(scale_by(constant, mantissa), exponent);
 }
 
 /* Sine of x radians, |x| <= pi/4: x (1 - x^2/6 + x^4/120 - ...). */
-static pair sine(pair x) {
-    static const pair c1 = {-0x1.5555555555555p-3, -0x1.5555555555555p-57}, c2 = {0x1.1111111111111p-7, 0x1.1111111111111p-63};
+static pair sine(pair x)
+{
+    static const pair c1 = {-0x1.5555555555555p-3, -0x1.5555555555555p-57},
+                      c2 = {0x1.1111111111111p-7, 0x1.1111111111111p-63};
     const pair x2 = multiply(x, x);
     const double z = x2.high;
     const double tail =
@@ -170,24 +190,28 @@ static pair sine(pair x) {
 }
 
 /* Cosine of x radians, |x| <= pi/4: 1 - x^2/2 + x^4/24 - ... */
-static pair cosine(pair x) {
-    static const pair c2 = {0x1.5555555555555p-5, 0x1.5555555555555p-59}, c3 = {-0x1.6c16c16c16c17p-10, 0x1.f49f49f49f49fp-65};
+static pair cosine(pair x)
+{
+    static const pair c2 = {0x1.5555555555555p-5, 0x1.5555555555555p-59},
+                      c3 = {-0x1.6c16c16c16c17p-10, 0x1.f49f49f49f49fp-65};
     const pair x2 = multiply(x, x);
     const double z = x2.high;
     const double tail =
         1.0 / 40320 +
         z * (-1.0 / 3628800 +
              z * (1.0 / 479001600 +
-                  z * (-1.0 / 87178291200 +
-                       z * (1.0 / 20922789888000 + z * (-1.0 / 6402373705728000 + z * (1.0 / 2432902008176640000))))));
+                  z * (-1.0 / 87178291200 + z * (1.0 / 20922789888000 +
+                                                 z * (-1.0 / 6402373705728000 + z * (1.0 / 2432902008176640000))))));
     pair sum = add(c3, two_product(z, tail));
     sum = add(c2, multiply(x2, sum));
     sum = add((pair){-0.5, 0}, multiply(x2, sum));
     return add((pair){1, 0}, multiply(x2, sum));
 }
 
-/* degrees = 360 n + 90 * quadrant + rest exactly, |rest| <= 45. Every step is exact (fmod; Sterbenz for the difference). */
-static double reduce(double degrees, int *quadrant) {
+/* degrees = 360 n + 90 * quadrant + rest exactly, |rest| <= 45. Every step is exact (fmod; Sterbenz for the
+ * difference). */
+static double reduce(double degrees, int *quadrant)
+{
     const double turn = fmod(degrees, 360);
     const double q = pl_round(turn / 90);
     *quadrant = (int)q & 3;
@@ -197,7 +221,8 @@ static double reduce(double degrees, int *quadrant) {
 /* Below this an angle's sine and tangent are the angle, its cosine is 1, as far as a double can tell. */
 static const double TINY = 0x1p-40;
 
-double pl_sin(double degrees) {
+double pl_sin(double degrees)
+{
     if (!(degrees - degrees == 0) || degrees == 0)
         return degrees == 0 ? degrees : NAN;
     int quadrant;
@@ -212,7 +237,8 @@ double pl_sin(double degrees) {
     return quadrant >= 2 ? -result.high - result.low : result.high + result.low;
 }
 
-double pl_cos(double degrees) {
+double pl_cos(double degrees)
+{
     if (!(degrees - degrees == 0))
         return NAN;
     int quadrant;
@@ -226,7 +252,8 @@ double pl_cos(double degrees) {
     return quadrant == 1 || quadrant == 2 ? -result.high - result.low : result.high + result.low;
 }
 
-double pl_tan(double degrees) {
+double pl_tan(double degrees)
+{
     if (!(degrees - degrees == 0) || degrees == 0)
         return degrees == 0 ? degrees : NAN;
     int quadrant;
@@ -242,7 +269,8 @@ double pl_tan(double degrees) {
 
 /* Arc tangent of n / d in degrees, for 0 <= n <= d, d > 0, nothing near over- or underflow. With c = j/16 near n/d:
  * atan(n/d) = atan(c) + atan((n - c d) / (d + c n)), whose argument is at most 1/32. */
-static pair arc_tangent(pair n, pair d) {
+static pair arc_tangent(pair n, pair d)
+{
     static const pair table[17] = {
         {0x0.0p+0, 0x0.0p+0},
         {0x1.c9c55326164cfp+1, -0x1.88708ff33aabap-55},
@@ -274,7 +302,8 @@ static pair arc_tangent(pair n, pair d) {
 }
 
 /* atan2 in degrees of n (its sign apart) and d, neither 0. */
-static pair angle_of(pair n, pair d) {
+static pair angle_of(pair n, pair d)
+{
     const bool left = d.high < 0;
     if (left)
         d = negate(d);
@@ -286,7 +315,8 @@ static pair angle_of(pair n, pair d) {
     return left ? add((pair){180, 0}, negate(angle)) : angle;
 }
 
-double pl_atan2(double y, double x) {
+double pl_atan2(double y, double x)
+{
     if (x != x || y != y)
         return NAN;
     const bool left = signbit(x);
@@ -317,11 +347,13 @@ double pl_atan2(double y, double x) {
 }
 
 /* sqrt(1 - a^2). */
-static pair other_leg(double a) {
+static pair other_leg(double a)
+{
     return root(multiply(two_sum(1, -a), two_sum(1, a)));
 }
 
-double pl_asin(double a) {
+double pl_asin(double a)
+{
     if (!(fabs(a) <= 1))
         return NAN;
     if (fabs(a) < TINY)
@@ -332,7 +364,8 @@ double pl_asin(double a) {
     return copysign(angle.high + angle.low, a);
 }
 
-double pl_acos(double a) {
+double pl_acos(double a)
+{
     if (!(fabs(a) <= 1))
         return NAN;
     if (fabs(a) < 0x1p-60)
@@ -346,18 +379,21 @@ double pl_acos(double a) {
 /* --- exponential functions --- */
 
 /* e^(x.high + x.low), rounded once, for |x.high| < 800. x = k log 2 + r, |r| < 0.35; e^r by Taylor. */
-static double exponential(pair x, bool negative) {
-    static const double LOG2_1 = 0x1.62e42fefa3800p-1;                                  /* 42 bits: k times it is exact */
-    static const pair LOG2_2 = {0x1.ef35793c76730p-45, 0x1.f97b57a079a19p-103};         /* the rest */
-    static const pair c4 = {0x1.5555555555555p-5, 0x1.5555555555555p-59}, c3 = {0x1.5555555555555p-3, 0x1.5555555555555p-57};
+static double exponential(pair x, bool negative)
+{
+    static const double LOG2_1 = 0x1.62e42fefa3800p-1;                          /* 42 bits: k times it is exact */
+    static const pair LOG2_2 = {0x1.ef35793c76730p-45, 0x1.f97b57a079a19p-103}; /* the rest */
+    static const pair c4 = {0x1.5555555555555p-5, 0x1.5555555555555p-59},
+                      c3 = {0x1.5555555555555p-3, 0x1.5555555555555p-57};
     const double k = pl_round(x.high * 0x1.71547652b82fep+0);
     pair r = two_sum(x.high, -k * LOG2_1);
     r = add(r, add((pair){x.low, 0}, scale_by(LOG2_2, -k)));
     const double z = r.high;
     double tail = 1.0 / 355687428096000;
-    static const double coefficients[] = {1.0 / 20922789888000, 1.0 / 1307674368000, 1.0 / 87178291200, 1.0 / 6227020800,
-                                          1.0 / 479001600,      1.0 / 39916800,      1.0 / 3628800,     1.0 / 362880,
-                                          1.0 / 40320,          1.0 / 5040,          1.0 / 720,         1.0 / 120};
+    static const double coefficients[] = {1.0 / 20922789888000, 1.0 / 1307674368000, 1.0 / 87178291200,
+                                          1.0 / 6227020800,     1.0 / 479001600,     1.0 / 39916800,
+                                          1.0 / 3628800,        1.0 / 362880,        1.0 / 40320,
+                                          1.0 / 5040,           1.0 / 720,           1.0 / 120};
     for (size_t i = 0; i < sizeof coefficients / sizeof *coefficients; i++)
         tail = coefficients[i] + z * tail;
     pair sum = add(c4, two_product(z, tail));
@@ -368,10 +404,13 @@ static double exponential(pair x, bool negative) {
     return join(negative ? negate(sum) : sum, (int)k);
 }
 
-/* Natural logarithm of finite a > 0: a = 2^k m, log m = 2 atanh((m - 1) / (m + 1)) with m between sqrt(1/2) and sqrt 2. */
-static pair logarithm(double a) {
+/* Natural logarithm of finite a > 0: a = 2^k m, log m = 2 atanh((m - 1) / (m + 1)) with m between sqrt(1/2) and
+ * sqrt 2. */
+static pair logarithm(double a)
+{
     static const pair LOG2 = {0x1.62e42fefa39efp-1, 0x1.abc9e3b39803fp-56};
-    static const pair c2 = {0x1.999999999999ap-3, -0x1.999999999999ap-57}, c3 = {0x1.2492492492492p-3, 0x1.2492492492492p-57};
+    static const pair c2 = {0x1.999999999999ap-3, -0x1.999999999999ap-57},
+                      c3 = {0x1.2492492492492p-3, 0x1.2492492492492p-57};
     int k;
     double m = split(a, &k);
     if (m > 0x1.6a09e667f3bcdp+0) {
@@ -391,7 +430,8 @@ static pair logarithm(double a) {
     return k ? add(scale_by(LOG2, k), sum) : sum;
 }
 
-double pl_exp(double a) {
+double pl_exp(double a)
+{
     if (a != a)
         return a;
     if (a > 710)
@@ -401,7 +441,8 @@ double pl_exp(double a) {
     return exponential((pair){a, 0}, false);
 }
 
-double pl_log(double a) {
+double pl_log(double a)
+{
     if (!(a > 0))
         return a == 0 ? -INFINITY : NAN;
     if (a - a != 0)
@@ -410,7 +451,8 @@ double pl_log(double a) {
     return result.high + result.low;
 }
 
-double pl_pow(double a, double b) {
+double pl_pow(double a, double b)
+{
     if (b == 0 || a == 1)
         return 1;
     if (a != a || b != b)
@@ -442,34 +484,41 @@ double pl_pow(double a, double b) {
 
 /* --- rounding and comparing --- */
 
-double pl_floor(double a) {
+double pl_floor(double a)
+{
     return floor(a);
 }
 
-double pl_ceil(double a) {
+double pl_ceil(double a)
+{
     return ceil(a);
 }
 
-double pl_round(double a) {
+double pl_round(double a)
+{
     const double size = fabs(a), below = floor(size);
     return copysign(size - below >= 0.5 ? below + 1 : below, a);
 }
 
-double pl_modulo(double a, double b) {
+double pl_modulo(double a, double b)
+{
     return fmod(a, b);
 }
 
-double pl_min(double a, double b) {
+double pl_min(double a, double b)
+{
     return a < b ? a : b;
 }
 
-double pl_max(double a, double b) {
+double pl_max(double a, double b)
+{
     return a > b ? a : b;
 }
 
 /* --- by opcode --- */
 
-static bool apply(int opcode, double a, double b, double c, double *out) {
+static bool apply(int opcode, double a, double b, double c, double *out)
+{
     switch (opcode) {
     case PL_OP_BOOL: *out = a != 0; return true;
     case PL_OP_ADD: *out = a + b; return true;
@@ -508,13 +557,15 @@ static bool apply(int opcode, double a, double b, double c, double *out) {
     }
 }
 
-double pl_elementary(int opcode, double a, double b, double c) {
+double pl_elementary(int opcode, double a, double b, double c)
+{
     double out;
     apply(opcode, a, b, c, &out);
     return out;
 }
 
-bool pl_elementary_array(int opcode, size_t n, const double *a, const double *b, const double *c, double *out) {
+bool pl_elementary_array(int opcode, size_t n, const double *a, const double *b, const double *c, double *out)
+{
     double unused;
     if (!apply(opcode, 0, 0, 0, &unused))
         return false;
@@ -525,30 +576,36 @@ bool pl_elementary_array(int opcode, size_t n, const double *a, const double *b,
 
 /* --- random numbers on arrays --- */
 
-uint64_t pl_name_hash_of(const char *bytes, size_t length) {
+uint64_t pl_name_hash_of(const char *bytes, size_t length)
+{
     return pl_name_hash(bytes, length);
 }
 
-uint64_t pl_seed_key_of(double seed) {
+uint64_t pl_seed_key_of(double seed)
+{
     return pl_seed_key(seed);
 }
 
-void pl_mix_array(size_t n, const uint64_t *k, const uint64_t *x, uint64_t *out) {
+void pl_mix_array(size_t n, const uint64_t *k, const uint64_t *x, uint64_t *out)
+{
     for (size_t i = 0; i < n; i++)
         out[i] = pl_mix(k[i], x[i]);
 }
 
-void pl_bits_array(size_t n, const double *a, uint64_t *out) {
+void pl_bits_array(size_t n, const double *a, uint64_t *out)
+{
     for (size_t i = 0; i < n; i++)
         out[i] = pl_bits(a[i]);
 }
 
-void pl_rand_array(size_t n, const uint64_t *key, const uint64_t *stream_bits, const uint64_t *ordinal, double *out) {
+void pl_rand_array(size_t n, const uint64_t *key, const uint64_t *stream_bits, const uint64_t *ordinal, double *out)
+{
     for (size_t i = 0; i < n; i++)
         out[i] = pl_rand(key[i], stream_bits[i], ordinal[i]);
 }
 
-void pl_hash_array(size_t n, uint64_t seed_key, size_t count, const double *arguments, double *out) {
+void pl_hash_array(size_t n, uint64_t seed_key, size_t count, const double *arguments, double *out)
+{
     for (size_t i = 0; i < n; i++)
         out[i] = pl_hash(seed_key, count, arguments + i * count);
 }

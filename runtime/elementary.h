@@ -1,12 +1,12 @@
 /* elementary.h - the language's pure functions, one implementation for runtime, compiler and unfolder.
  *
- * Nothing here calls libm's transcendental functions: results depend on IEEE + − · / √ only, in one written order, and
- * so have the same bits for every compiler, optimisation level and instruction set (compiled with contraction off).
- * elementary.c stands alone: it is built into libplsys and once more into the compiler's libelementary.
+ * Nothing here calls libm's transcendental functions: results depend on IEEE + − · / √ only, in one written order,
+ * and so have the same bits for every compiler, optimisation level and instruction set (compiled with contraction
+ * off). elementary.c stands alone: it is built into libplsys and once more into the compiler's libelementary.
  *
  * Largest error, measured against 200-bit arithmetic over the whole range, denormal results included
- * (tests/compiler/test_elementary.py): 0.501 units in the last place for exp, log, pow, sin, cos, tan, asin, acos and atan2; mix,
- * written a*(1 - t) + b*t, has its four roundings; everything else is exact or rounded once. */
+ * (tests/compiler/test_elementary.py): 0.501 units in the last place for exp, log, pow, sin, cos, tan, asin, acos and
+ * atan2; mix, written a*(1 - t) + b*t, has its four roundings; everything else is exact or rounded once. */
 #ifndef PL_ELEMENTARY_H
 #define PL_ELEMENTARY_H
 
@@ -15,7 +15,8 @@
 
 #include "plsys.h"
 
-/* Angles in degrees. Multiples of 90 degrees are exact; sin and tan are odd, cos is even. NaN for infinite arguments. */
+/* Angles in degrees. Multiples of 90 degrees are exact; sin and tan are odd, cos is even. NaN for infinite arguments.
+ */
 double pl_sin(double degrees);
 double pl_cos(double degrees);
 double pl_tan(double degrees); /* at odd multiples of 90: an infinity of the sign of the sine */
@@ -44,7 +45,8 @@ PL_API uint64_t pl_name_hash_of(const char *bytes, size_t length);
 PL_API uint64_t pl_seed_key_of(double seed);
 PL_API void pl_mix_array(size_t n, const uint64_t *k, const uint64_t *x, uint64_t *out);
 PL_API void pl_bits_array(size_t n, const double *a, uint64_t *out);
-PL_API void pl_rand_array(size_t n, const uint64_t *key, const uint64_t *stream_bits, const uint64_t *ordinal, double *out);
+PL_API void pl_rand_array(size_t n, const uint64_t *key, const uint64_t *stream_bits, const uint64_t *ordinal,
+                          double *out);
 PL_API void pl_hash_array(size_t n, uint64_t seed_key, size_t count, const double *arguments, double *out);
 
 #endif

@@ -8,7 +8,8 @@
 
 #include "program.h"
 
-static bool fail(pl_error *error, int code, const char *place, const char *format, va_list arguments) {
+static bool fail(pl_error *error, int code, const char *place, const char *format, va_list arguments)
+{
     if (error && error->code == PL_OK) {
         error->code = code;
         snprintf(error->place, sizeof error->place, "%s", place);
@@ -17,7 +18,8 @@ static bool fail(pl_error *error, int code, const char *place, const char *forma
     return false;
 }
 
-bool pl_fail(pl_error *error, int code, const char *place, const char *format, ...) {
+bool pl_fail(pl_error *error, int code, const char *place, const char *format, ...)
+{
     va_list arguments;
     va_start(arguments, format);
     fail(error, code, place, format, arguments);
@@ -25,7 +27,8 @@ bool pl_fail(pl_error *error, int code, const char *place, const char *format, .
     return false;
 }
 
-bool pl_fail_at(pl_error *error, int code, const pl_program *program, uint32_t node, const char *format, ...) {
+bool pl_fail_at(pl_error *error, int code, const pl_program *program, uint32_t node, const char *format, ...)
+{
     char place[256];
     va_list arguments;
     va_start(arguments, format);
@@ -34,18 +37,21 @@ bool pl_fail_at(pl_error *error, int code, const pl_program *program, uint32_t n
     return false;
 }
 
-bool pl_fail_memory(pl_error *error, const char *what) {
+bool pl_fail_memory(pl_error *error, const char *what)
+{
     return pl_fail(error, PL_ERROR_MEMORY, what, "out of memory");
 }
 
-void pl_error_clear(pl_error *error) {
+void pl_error_clear(pl_error *error)
+{
     if (error) {
         error->code = PL_OK;
         error->place[0] = error->reason[0] = '\0';
     }
 }
 
-char *pl_number_text(double value, char buffer[PL_NUMBER_TEXT]) {
+char *pl_number_text(double value, char buffer[PL_NUMBER_TEXT])
+{
     for (int digits = 15; digits <= 17; digits++) {
         snprintf(buffer, PL_NUMBER_TEXT, "%.*g", digits, value == 0 ? 0.0 : value);
         if (strtod(buffer, NULL) == value)

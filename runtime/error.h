@@ -4,15 +4,16 @@
  *         return pl_fail(error, PL_ERROR_LIMIT, "nodes", "%u nodes, at most %u", count, PL_LIMIT_NODES);
  *
  * The first error is the one that counts: a later pl_fail on an error that is already set leaves it as it is, so that
- * clean-up code can't hide the cause. A function that can fail starts with nobody having called pl_error_clear but the
- * public entry points. */
+ * clean-up code can't hide the cause. A function that can fail starts with nobody having called pl_error_clear but
+ * the public entry points. */
 #ifndef PL_ERROR_H
 #define PL_ERROR_H
 
 #include "plsys.h"
 
 /* Sets *error (which may be NULL) to code, place and a printf-style reason. Always returns false. */
-bool pl_fail(pl_error *error, int code, const char *place, const char *format, ...) __attribute__((format(printf, 4, 5)));
+bool pl_fail(pl_error *error, int code, const char *place, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
 
 /* "out of memory" while doing `what`; always returns false. */
 bool pl_fail_memory(pl_error *error, const char *what);

@@ -13,26 +13,30 @@
 #include "random.h"
 #include "table.h"
 
-static bool is_finite(double a) {
+static bool is_finite(double a)
+{
     return a - a == 0;
 }
 
 /* --- scopes --- */
 
-static void copy_draws(const pl_scope *scope, pl_scope *target) {
+static void copy_draws(const pl_scope *scope, pl_scope *target)
+{
     target->key = scope->key;
     target->symbol = scope->symbol;
     target->draws = scope->draws;
     memcpy(target->drawn, scope->drawn, scope->draws * sizeof *scope->drawn);
 }
 
-void pl_scope_copy(const pl_program *program, const pl_scope *scope, pl_scope *target) {
+void pl_scope_copy(const pl_program *program, const pl_scope *scope, pl_scope *target)
+{
     copy_draws(scope, target);
     if (program->parameter_count)
         memcpy(target->parameters, scope->parameters, program->parameter_count * sizeof *scope->parameters);
 }
 
-void pl_scope_object(const pl_program *program, uint32_t node, pl_scope *scope) {
+void pl_scope_object(const pl_program *program, uint32_t node, pl_scope *scope)
+{
     const pl_node *n = &program->nodes[node];
     for (uint32_t i = 0; i < program->parameter_count; i++)
         scope->parameters[i] = NAN;
@@ -41,18 +45,21 @@ void pl_scope_object(const pl_program *program, uint32_t node, pl_scope *scope) 
     scope->draws = 0;
 }
 
-void pl_scope_enter(const pl_program *program, uint32_t node, pl_scope *scope) {
+void pl_scope_enter(const pl_program *program, uint32_t node, pl_scope *scope)
+{
     scope->key = pl_mix(scope->key, program->strings[program->nodes[node].as.symbol.name].hash);
     scope->symbol = node;
     scope->draws = 0;
 }
 
-void pl_scope_term(pl_scope *scope, uint32_t term) {
+void pl_scope_term(pl_scope *scope, uint32_t term)
+{
     scope->key = pl_term_key(scope->key, term);
 }
 
 /* The next draw on a stream of this application. */
-static double draw(pl_scope *scope, uint64_t stream_bits) {
+static double draw(pl_scope *scope, uint64_t stream_bits)
+{
     uint32_t ordinal = 0;
     for (uint32_t i = 0; i < scope->draws; i++)
         ordinal += scope->drawn[i] == stream_bits;
@@ -70,28 +77,32 @@ typedef struct machine {
     pl_error *error;
 } machine;
 
-static const char *number(double value, char buffer[PL_NUMBER_TEXT]) {
+static const char *number(double value, char buffer[PL_NUMBER_TEXT])
+{
     if (value != value)
         return "NaN";
     return is_finite(value) ? pl_number_text(value, buffer) : value > 0 ? "infinity" : "-infinity";
 }
 
 /* "Tree, C_Tree" or "Tree": where the code stands. */
-static void say_where(const machine *m, char *text, size_t size) {
+static void say_where(const machine *m, char *text, size_t size)
+{
     const pl_program *program = m->program;
     const pl_node *n = &program->nodes[m->node];
     uint32_t name = 0;
     if (n->kind == PL_NODE_CALCULATE || n->kind == PL_NODE_TRANSFORM_CODE || n->kind == PL_NODE_TEXTURE)
         name = n->as.words[0];
-    const char *symbol =
-        m->scope->symbol < program->node_count ? program->strings[program->nodes[m->scope->symbol].as.symbol.name].text : "";
+    const char *symbol = m->scope->symbol < program->node_count
+                             ? program->strings[program->nodes[m->scope->symbol].as.symbol.name].text
+                             : "";
     const char *operator_ = program->strings[name].text;
     snprintf(text, size, "%s%s%s%s", symbol, *symbol && *operator_ ? ", " : "", operator_,
              *symbol || *operator_ ? ": " : "");
 }
 
 /* " (betaBr = 60, cntTree = 10)": the parameters that have values, as far as there is room. */
-static void say_values(const machine *m, char *text, size_t size) {
+static void say_values(const machine *m, char *text, size_t size)
+{
     size_t used = 0;
     text[0] = '\0';
     for (uint32_t i = 0; i < m->program->parameter_count; i++) {
@@ -108,34 +119,39 @@ static void say_values(const machine *m, char *text, size_t size) {
         snprintf(text + used, size - used, ")");
 }
 
-#define FAIL(m, format, ...)                                                                                    \
-    do {                                                                                                        \
-        char where[128], values[192];                                                                           \
-        say_where(m, where, sizeof where);                                                                      \
-        say_values(m, values, sizeof values);                                                                   \
+#define FAIL(m, format, ...) \
+    do { \
+        char where[128], values[192]; \
+        say_where(m, where, sizeof where); \
+        say_values(m, values, sizeof values); \
         return pl_fail_at((m)->error, PL_ERROR_SCENE, (m)->program, (m)->node, "%s" format "%s", where, __VA_ARGS__, \
-                          values);                                                                              \
+                          values); \
     } while (0)
 
-static const char *parameter_name(const machine *m, uint32_t slot) {
+static const char *parameter_name(const machine *m, uint32_t slot)
+{
     return m->program->strings[m->program->parameters[slot]].text;
 }
 
-static bool fail_unset(const machine *m, uint32_t slot) {
+static bool fail_unset(const machine *m, uint32_t slot)
+{
     FAIL(m, "the parameter %s is read before it has a value", parameter_name(m, slot));
 }
 
-static bool fail_value(const machine *m, const char *what, double value) {
+static bool fail_value(const machine *m, const char *what, double value)
+{
     char buffer[PL_NUMBER_TEXT];
     FAIL(m, "%s is %s", what, number(value, buffer));
 }
 
-static bool fail_store(const machine *m, uint32_t slot, double value) {
+static bool fail_store(const machine *m, uint32_t slot, double value)
+{
     char buffer[PL_NUMBER_TEXT];
     FAIL(m, "the parameter %s would become %s", parameter_name(m, slot), number(value, buffer));
 }
 
-static bool fail_texture(const machine *m, uint32_t index, double value) {
+static bool fail_texture(const machine *m, uint32_t index, double value)
+{
     char buffer[PL_NUMBER_TEXT];
     uint32_t first, size;
     const char *name = index < PL_TEXTURE_VALUES
@@ -144,25 +160,30 @@ static bool fail_texture(const machine *m, uint32_t index, double value) {
     FAIL(m, "the texture's %s would become %s", name, number(value, buffer));
 }
 
-static bool fail_argument(const machine *m, const char *operation, int position, double value) {
+static bool fail_argument(const machine *m, const char *operation, int position, double value)
+{
     char buffer[PL_NUMBER_TEXT];
     FAIL(m, "argument %d of %s is %s", position, operation, number(value, buffer));
 }
 
-static bool fail_matrix(const machine *m) {
+static bool fail_matrix(const machine *m)
+{
     FAIL(m, "%s", "the transformation's matrix isn't finite");
 }
 
-static bool fail_axis(const machine *m) {
+static bool fail_axis(const machine *m)
+{
     FAIL(m, "%s", "rot needs an axis, <0, 0, 0> is none");
 }
 
-static bool fail_variants(const machine *m, double count) {
+static bool fail_variants(const machine *m, double count)
+{
     char buffer[PL_NUMBER_TEXT];
     FAIL(m, "variants needs a whole number from 1 to 4294967296, not %s", number(count, buffer));
 }
 
-static bool fail_weights(const machine *m, double total) {
+static bool fail_weights(const machine *m, double total)
+{
     char buffer[PL_NUMBER_TEXT];
     FAIL(m, "the weights' sum is %s", number(total, buffer));
 }
@@ -170,7 +191,8 @@ static bool fail_weights(const machine *m, double total) {
 /* --- transformations --- */
 
 /* M := M * R for a rotation in the plane of axes i and j, from i towards j. */
-static void rotate_plane(pl_affine *matrix, int i, int j, double degrees) {
+static void rotate_plane(pl_affine *matrix, int i, int j, double degrees)
+{
     const double c = pl_cos(degrees), s = pl_sin(degrees);
     for (int r = 0; r < 3; r++) {
         double *row = matrix->m + 4 * r;
@@ -180,9 +202,10 @@ static void rotate_plane(pl_affine *matrix, int i, int j, double degrees) {
     }
 }
 
-/* Rodrigues' rotation by a[0] degrees about the axis a[1..3]; false if that is zero. The axis is scaled by its largest
- * component before it is normalised, so that no square over- or underflows. */
-static bool rotation(const double a[4], pl_affine *out) {
+/* Rodrigues' rotation by a[0] degrees about the axis a[1..3]; false if that is zero. The axis is scaled by its
+ * largest component before it is normalised, so that no square over- or underflows. */
+static bool rotation(const double a[4], pl_affine *out)
+{
     const double largest = pl_max(fabs(a[1]), pl_max(fabs(a[2]), fabs(a[3])));
     if (largest == 0)
         return false;
@@ -192,14 +215,15 @@ static bool rotation(const double a[4], pl_affine *out) {
     y /= length;
     z /= length;
     const double c = pl_cos(a[0]), s = pl_sin(a[0]), t = 1 - c;
-    *out = (pl_affine){{t * x * x + c, t * x * y - s * z, t * x * z + s * y, 0,   /**/
-                        t * x * y + s * z, t * y * y + c, t * y * z - s * x, 0,   /**/
+    *out = (pl_affine){{t * x * x + c, t * x * y - s * z, t * x * z + s * y, 0, /**/
+                        t * x * y + s * z, t * y * y + c, t * y * z - s * x, 0, /**/
                         t * x * z - s * y, t * y * z + s * x, t * z * z + c, 0}};
     return true;
 }
 
 /* M := M * step; a holds the opcode's arguments. */
-static bool transform(const machine *m, uint8_t opcode, const double *a) {
+static bool transform(const machine *m, uint8_t opcode, const double *a)
+{
     pl_affine *matrix = &m->result->matrix, step = pl_affine_identity();
     const pl_op_row *row = pl_op_row_of(opcode);
     for (int i = 0; i < row->pops; i++)
@@ -237,7 +261,8 @@ static bool transform(const machine *m, uint8_t opcode, const double *a) {
 
 /* --- the machine --- */
 
-static uint32_t operand(const uint8_t **at) {
+static uint32_t operand(const uint8_t **at)
+{
     uint32_t value = 0;
     for (int shift = 0;; shift += 7) {
         const uint8_t byte = *(*at)++;
@@ -247,14 +272,17 @@ static uint32_t operand(const uint8_t **at) {
     }
 }
 
-static bool variants(const machine *m, uint32_t name, double count) {
+static bool variants(const machine *m, uint32_t name, double count)
+{
     if (!(count >= 1 && count <= 0x1p32 && count == pl_floor(count)))
         return fail_variants(m, count);
-    m->scope->key = pl_mix(pl_mix(m->program->seed_key, m->program->strings[name].hash), m->scope->key % (uint64_t)count);
+    m->scope->key =
+        pl_mix(pl_mix(m->program->seed_key, m->program->strings[name].hash), m->scope->key % (uint64_t)count);
     return true;
 }
 
-static bool check_finite(const machine *m, const char *function, const double *values, uint32_t count) {
+static bool check_finite(const machine *m, const char *function, const double *values, uint32_t count)
+{
     for (uint32_t i = 0; i < count; i++)
         if (!is_finite(values[i]))
             return fail_argument(m, function, (int)i + 1, values[i]);
@@ -262,7 +290,8 @@ static bool check_finite(const machine *m, const char *function, const double *v
 }
 
 /* Runs from `at` to the end. `top` is the first free place of the stack. */
-static bool run(const machine *m, const uint8_t *at) {
+static bool run(const machine *m, const uint8_t *at)
+{
     const pl_program *program = m->program;
     double *top = m->result->values;
     uint32_t index;
@@ -336,7 +365,9 @@ static bool run(const machine *m, const uint8_t *at) {
     }
 }
 
-bool pl_run(const pl_program *program, uint32_t node, uint32_t code, pl_scope *scope, pl_result *result, pl_error *error) {
+bool pl_run(const pl_program *program, uint32_t node, uint32_t code, pl_scope *scope, pl_result *result,
+            pl_error *error)
+{
     const machine m = {program, node, scope, result, error};
     result->count = 0;
     result->matrix = pl_affine_identity();
@@ -359,7 +390,8 @@ bool pl_run(const pl_program *program, uint32_t node, uint32_t code, pl_scope *s
     return true;
 }
 
-bool pl_branch(const pl_program *program, uint32_t node, pl_scope *scope, uint32_t *child, pl_error *error) {
+bool pl_branch(const pl_program *program, uint32_t node, pl_scope *scope, uint32_t *child, pl_error *error)
+{
     const pl_node *n = &program->nodes[node];
     pl_result result;
     result.texture = NULL;
@@ -369,9 +401,10 @@ bool pl_branch(const pl_program *program, uint32_t node, pl_scope *scope, uint32
     return true;
 }
 
-/* Two passes over the weights, so that no case needs memory: the first sums them up, the second, from the same scope and so
- * with the same draws, finds the case. */
-bool pl_choose(const pl_program *program, uint32_t node, pl_scope *scope, uint32_t *child, pl_error *error) {
+/* Two passes over the weights, so that no case needs memory: the first sums them up, the second, from the same scope
+ * and so with the same draws, finds the case. */
+bool pl_choose(const pl_program *program, uint32_t node, pl_scope *scope, uint32_t *child, pl_error *error)
+{
     const pl_node *n = &program->nodes[node];
     const pl_case *cases = program->cases + n->as.choose.cases_first;
     const uint32_t count = n->as.choose.cases_count, draws_before = scope->draws;
@@ -395,7 +428,7 @@ bool pl_choose(const pl_program *program, uint32_t node, pl_scope *scope, uint32
         if (!pl_run(program, node, cases[i].weight, scope, &result, error))
             return false;
         sum += result.values[0];
-        if (result.values[0] > 0) /* a denormal total's product may round up to it: then the last that can be counts */
+        if (result.values[0] > 0) /* the product of a denormal total may round up to it: then the last one counts */
             *child = cases[i].body;
     }
     scope->draws = draws_after;

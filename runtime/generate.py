@@ -2,7 +2,7 @@
 compiler/bytecode/layout_rows.py.
 
     python runtime/generate.py            writes both files
-    python runtime/generate.py --check    writes nothing; exit code 1 and a message if one of them is out of date
+    python runtime/generate.py --check    writes nothing; exit code 1 and a message if one is out of date
 
 Nothing else reads bytecode.toml: the runtime includes the header, the compiler imports the rows.
 """
@@ -55,7 +55,9 @@ def values_of(record: dict) -> list[tuple[str, int, int, tuple[float, ...]]]:
         size, default = value["size"], value["default"]
         numbers = tuple(map(float, default if isinstance(default, list) else [default] * size))
         if len(numbers) != size:
-            raise ValueError(f"record {record['name']}: {value['name']} has {len(numbers)} defaults, not {size}")
+            raise ValueError(
+                f"record {record['name']}: {value['name']} has {len(numbers)} defaults, not {size}"
+            )
         rows.append((value["name"], offset, size, numbers))
         offset += size
     return rows
@@ -75,7 +77,7 @@ def check_ids(table: dict) -> None:
                 raise ValueError(f"two {kind} rows have the same {key}")
 
 
-# --- C --------------------------------------------------------------------------------------------------------
+# --- C ---
 
 
 def c_enum(prefix: str, rows: list[dict], comment: str) -> list[str]:
@@ -120,7 +122,7 @@ def c_nodes(table: dict) -> list[str]:
         "};",
         "",
         *c_table("PL_NODE_FIELDS", "Fields of nodes in file order: X(NODE, name, type).", field_rows),
-        "/* A node's fields in memory. A list is the index of its first element in the program's pool and a count.",
+        "/* A node's fields in memory. A list is the index of its first element in a pool and a count.",
         " * `words` are the same numbers in file order; a list takes two of them, every other field one. */",
         f"enum {{ PL_NODE_WORDS = {max(len(words_of(node)) for node in nodes)} }};",
         "typedef union pl_node_fields {",
@@ -133,8 +135,8 @@ def c_nodes(table: dict) -> list[str]:
 
 def c_opcodes(table: dict) -> list[str]:
     rows = [
-        f'{row["name"].upper()}, "{row["name"]}", {row["id"]}, PL_OPERAND_{(operand_of(row) or "none").upper()}, '
-        f"{row['pops']}, {row['pushes']}"
+        f'{row["name"].upper()}, "{row["name"]}", {row["id"]}, '
+        f"PL_OPERAND_{(operand_of(row) or 'none').upper()}, {row['pops']}, {row['pushes']}"
         for row in table["opcode"]
     ]
     return [
@@ -179,7 +181,9 @@ def c_records(table: dict) -> list[str]:
         for record in table["record"]
         for i, name in enumerate(record.get("entry", []))
     ]
-    return lines + c_table("PL_RECORD_ENTRIES", "Numbers of an entry: X(RECORD, name, offset in the entry).", rows)
+    return lines + c_table(
+        "PL_RECORD_ENTRIES", "Numbers of an entry: X(RECORD, name, offset in the entry).", rows
+    )
 
 
 def c_shapes(table: dict) -> list[str]:
@@ -188,9 +192,10 @@ def c_shapes(table: dict) -> list[str]:
         f"{str(row.get('unbounded', False)).lower()}"
         for row in table["shape"]
     ]
+    most = max(len(row["arguments"]) for row in table["shape"])
     return [
         *c_enum("SHAPE", table["shape"], "Shapes."),
-        f"enum {{ PL_SHAPE_ARGUMENTS = {max(len(row['arguments']) for row in table['shape'])} }}; /* most that one has */",
+        f"enum {{ PL_SHAPE_ARGUMENTS = {most} }}; /* most that one has */",
         "",
         *c_table("PL_SHAPES", "Shapes: X(ENUM, name, id, arguments, unbounded).", rows),
     ]
@@ -243,9 +248,9 @@ def header(table: dict) -> str:
     return "\n".join(lines) + "\n"
 
 
-# --- Python -------------------------------------------------------------------------------------------------------
+# --- Python ---
 
-PYTHON_HEAD = '''"""The bytecode's sections, nodes, opcodes, shapes and records as plain rows, by name, in the order of their ids.
+PYTHON_HEAD = '''"""The bytecode's sections, nodes, opcodes, shapes and records as plain rows by name, in the order of ids.
 
 Generated from runtime/bytecode.toml by runtime/generate.py, which documents every row: don't edit.
 

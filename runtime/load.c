@@ -1,7 +1,8 @@
 /* load.c - bytecode -> program: the container, and the sections of plain lists.
  *
  * Nothing in the bytes is trusted: header, sentinels, checksum and every section's bounds are checked here, each
- * section's own contents where it is read (reader.h), and what needs more than one element to be judged by verify.c. */
+ * section's own contents where it is read (reader.h), and what needs more than one element to be judged by verify.c.
+ */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +17,8 @@ enum { HEADER_BYTES = 28 };
 /* --- strings, constants, parameters, code --- */
 
 /* Whether the bytes are UTF-8 (Unicode, table 3-7) without control characters. */
-static bool is_text(const uint8_t *s, size_t length) {
+static bool is_text(const uint8_t *s, size_t length)
+{
     for (size_t i = 0; i < length;) {
         const uint8_t c = s[i++];
         if (c < 0x20 || c == 0x7F)
@@ -38,7 +40,8 @@ static bool is_text(const uint8_t *s, size_t length) {
     return true;
 }
 
-static void read_strings(pl_reader *r) {
+static void read_strings(pl_reader *r)
+{
     const uint32_t count = pl_read_count(r, 1);
     char *text = pl_read_allocate(r, pl_read_left(r) + count, 1); /* the bytes, and a NUL each */
     pl_string *strings = pl_read_allocate(r, count, sizeof *strings);
@@ -59,14 +62,16 @@ static void read_strings(pl_reader *r) {
     r->program->string_count = count;
 }
 
-static int compare_bits(const void *a, const void *b) {
+static int compare_bits(const void *a, const void *b)
+{
     uint64_t x, y;
     memcpy(&x, a, sizeof x);
     memcpy(&y, b, sizeof y);
     return (x > y) - (x < y);
 }
 
-static void read_constants(pl_reader *r) {
+static void read_constants(pl_reader *r)
+{
     const uint32_t count = pl_read_count(r, 8);
     double *constants = pl_read_allocate(r, count, sizeof *constants);
     for (uint32_t i = 0; i < count && !r->failed; i++) {
@@ -92,7 +97,8 @@ static void read_constants(pl_reader *r) {
     free(sorted);
 }
 
-static void read_parameters(pl_reader *r) {
+static void read_parameters(pl_reader *r)
+{
     const uint32_t count = pl_read_count(r, 1);
     uint32_t *parameters = pl_read_allocate(r, count, sizeof *parameters);
     for (uint32_t i = 0; i < count && !r->failed; i++)
@@ -101,7 +107,8 @@ static void read_parameters(pl_reader *r) {
     r->program->parameter_count = count;
 }
 
-static void read_code(pl_reader *r) {
+static void read_code(pl_reader *r)
+{
     const uint32_t length = pl_read_count(r, 1);
     uint8_t *code = pl_read_allocate(r, length, 1);
     if (r->failed)
@@ -131,7 +138,8 @@ static const struct {
 };
 
 /* zlib's CRC-32. */
-static uint32_t checksum(const uint8_t *bytes, size_t length) {
+static uint32_t checksum(const uint8_t *bytes, size_t length)
+{
     uint32_t table[256];
     for (uint32_t i = 0; i < 256; i++) {
         uint32_t c = i;
@@ -145,16 +153,19 @@ static uint32_t checksum(const uint8_t *bytes, size_t length) {
     return crc ^ 0xFFFFFFFFu;
 }
 
-static bool check_header(const uint8_t *bytes, size_t length, pl_error *error) {
+static bool check_header(const uint8_t *bytes, size_t length, pl_error *error)
+{
     const char *const place = "bytecode";
     if (length < 4 || memcmp(bytes, PL_MAGIC, 4) != 0)
         return pl_fail(error, PL_ERROR_BYTECODE, place, "this isn't plsys bytecode: it doesn't begin with " PL_MAGIC);
     if (length < HEADER_BYTES)
-        return pl_fail(error, PL_ERROR_BYTECODE, place, "truncated: %zu bytes, the header alone has %d", length, HEADER_BYTES);
-    const uint32_t version = (uint32_t)pl_little_endian(bytes + 4, 2), flags = (uint32_t)pl_little_endian(bytes + 6, 2);
+        return pl_fail(error, PL_ERROR_BYTECODE, place, "truncated: %zu bytes, the header alone has %d", length,
+                       HEADER_BYTES);
+    const uint32_t version = (uint32_t)pl_little_endian(bytes + 4, 2),
+                   flags = (uint32_t)pl_little_endian(bytes + 6, 2);
     if (version != PL_VERSION)
-        return pl_fail(error, PL_ERROR_BYTECODE, place, "version %u, but this program reads version %d: compile again",
-                       version, PL_VERSION);
+        return pl_fail(error, PL_ERROR_BYTECODE, place,
+                       "version %u, but this program reads version %d: compile again", version, PL_VERSION);
     if (flags != 0)
         return pl_fail(error, PL_ERROR_BYTECODE, place, "unknown flags %u", flags);
     if (length > PL_LIMIT_BYTES)
@@ -162,7 +173,8 @@ static bool check_header(const uint8_t *bytes, size_t length, pl_error *error) {
     const uint64_t stated = pl_little_endian(bytes + 8, 4);
     if (stated != length)
         return pl_fail(error, PL_ERROR_BYTECODE, place, "%s: %zu bytes, the header says %llu",
-                       stated > length ? "truncated" : "something follows the end", length, (unsigned long long)stated);
+                       stated > length ? "truncated" : "something follows the end", length,
+                       (unsigned long long)stated);
     const uint32_t found = checksum(bytes + HEADER_BYTES, length - HEADER_BYTES);
     if (found != pl_little_endian(bytes + 12, 4))
         return pl_fail(error, PL_ERROR_BYTECODE, place, "damaged: the checksum is %08x, the header says %08x", found,
@@ -175,7 +187,8 @@ static bool check_header(const uint8_t *bytes, size_t length, pl_error *error) {
     return true;
 }
 
-static bool read_sections(const uint8_t *at, const uint8_t *end, pl_program *program, pl_error *error) {
+static bool read_sections(const uint8_t *at, const uint8_t *end, pl_program *program, pl_error *error)
+{
     pl_reader file = {.at = at, .end = end, .section = "bytecode", .program = program, .error = error};
     for (size_t i = 0; i < sizeof SECTIONS / sizeof *SECTIONS; i++) {
         const uint32_t id = pl_read_u(&file);
@@ -199,7 +212,8 @@ static bool read_sections(const uint8_t *at, const uint8_t *end, pl_program *pro
     return !file.failed;
 }
 
-pl_program *pl_program_load(const void *bytes, size_t length, pl_error *error) {
+pl_program *pl_program_load(const void *bytes, size_t length, pl_error *error)
+{
     const uint8_t *const file = bytes;
     if (!check_header(file, length, error))
         return NULL;
@@ -215,7 +229,8 @@ pl_program *pl_program_load(const void *bytes, size_t length, pl_error *error) {
     return NULL;
 }
 
-char *pl_program_place(const pl_program *program, uint32_t node, char *buffer, size_t size) {
+char *pl_program_place(const pl_program *program, uint32_t node, char *buffer, size_t size)
+{
     const pl_place *place = node < program->node_count && program->places ? &program->places[node] : NULL;
     if (place && place->line)
         snprintf(buffer, size, "%s:%u:%u", program->strings[place->file].text, place->line, place->column);
@@ -224,7 +239,8 @@ char *pl_program_place(const pl_program *program, uint32_t node, char *buffer, s
     return buffer;
 }
 
-uint32_t pl_program_rule(const pl_program *program, uint32_t index) {
+uint32_t pl_program_rule(const pl_program *program, uint32_t index)
+{
     for (uint32_t i = 0; i < program->rule_count; i++)
         if (program->nodes[program->rules[i]].as.rule.index == index)
             return program->rules[i];

@@ -4,8 +4,8 @@
 #include "reader.h"
 #include "table.h"
 
-/* The pools that lists of nodes go to. Nodes are read twice: with `store` false to count what the pools must hold, then
- * with it true to fill them. */
+/* The pools that lists of nodes go to. Nodes are read twice: with `store` false to count what the pools must hold,
+ * then with it true to fill them. */
 typedef struct pools {
     bool store;
     pl_node *nodes;
@@ -15,7 +15,8 @@ typedef struct pools {
     uint32_t child_count, slot_count, case_count, transform_count;
 } pools;
 
-static void read_children(pl_reader *r, pools *p, uint32_t words[2]) {
+static void read_children(pl_reader *r, pools *p, uint32_t words[2])
+{
     words[0] = p->child_count;
     words[1] = pl_read_count(r, 1);
     for (uint32_t i = 0; i < words[1] && !r->failed; i++) {
@@ -26,7 +27,8 @@ static void read_children(pl_reader *r, pools *p, uint32_t words[2]) {
     p->child_count += words[1];
 }
 
-static void read_slots(pl_reader *r, pools *p, uint32_t words[2]) {
+static void read_slots(pl_reader *r, pools *p, uint32_t words[2])
+{
     words[0] = p->slot_count;
     words[1] = pl_read_count(r, 1);
     uint32_t last = 0;
@@ -41,7 +43,8 @@ static void read_slots(pl_reader *r, pools *p, uint32_t words[2]) {
     p->slot_count += words[1];
 }
 
-static void read_cases(pl_reader *r, pools *p, uint32_t words[2]) {
+static void read_cases(pl_reader *r, pools *p, uint32_t words[2])
+{
     words[0] = p->case_count;
     words[1] = pl_read_count(r, 2);
     for (uint32_t i = 0; i < words[1] && !r->failed; i++) {
@@ -53,7 +56,8 @@ static void read_cases(pl_reader *r, pools *p, uint32_t words[2]) {
     p->case_count += words[1];
 }
 
-static uint32_t read_matrix(pl_reader *r, pools *p) {
+static uint32_t read_matrix(pl_reader *r, pools *p)
+{
     pl_affine matrix = pl_affine_identity();
     for (int i = 0; i < 12; i++) {
         const uint32_t constant = pl_read_index(r, r->program->constant_count, "constant");
@@ -69,7 +73,8 @@ static uint32_t read_matrix(pl_reader *r, pools *p) {
 }
 
 /* A field -> its words. Codes and shapes are verify.c's to check. */
-static void read_field(pl_reader *r, pools *p, uint8_t type, uint32_t *words) {
+static void read_field(pl_reader *r, pools *p, uint8_t type, uint32_t *words)
+{
     const pl_program *program = r->program;
     switch (type) {
     case PL_FIELD_NODE: words[0] = pl_read_index(r, program->node_count, "node"); break;
@@ -84,7 +89,8 @@ static void read_field(pl_reader *r, pools *p, uint8_t type, uint32_t *words) {
     }
 }
 
-static void read_all(pl_reader *r, pools *p) {
+static void read_all(pl_reader *r, pools *p)
+{
     for (uint32_t i = 0; i < r->program->node_count && !r->failed; i++) {
         const uint32_t kind = pl_read_u(r);
         const pl_node_row *row = pl_node_row_of(kind);
@@ -106,7 +112,8 @@ static void read_all(pl_reader *r, pools *p) {
 }
 
 /* Lists the symbol and rule nodes. */
-static void index_nodes(pl_reader *r, pl_node *nodes) {
+static void index_nodes(pl_reader *r, pl_node *nodes)
+{
     pl_program *program = r->program;
     for (uint32_t i = 0; i < program->node_count; i++) {
         program->symbol_count += nodes[i].kind == PL_NODE_SYMBOL;
@@ -128,7 +135,8 @@ static void index_nodes(pl_reader *r, pl_node *nodes) {
     }
 }
 
-void pl_read_nodes(pl_reader *r) {
+void pl_read_nodes(pl_reader *r)
+{
     pl_program *program = r->program;
     program->node_count = pl_read_count(r, 1);
     if (!r->failed && program->node_count == 0)
@@ -164,7 +172,8 @@ void pl_read_nodes(pl_reader *r) {
     index_nodes(r, p.nodes);
 }
 
-void pl_read_sourcemap(pl_reader *r) {
+void pl_read_sourcemap(pl_reader *r)
+{
     pl_program *program = r->program;
     const uint32_t file_count = pl_read_count(r, 1);
     const uint8_t *files_at = r->at;

@@ -7,7 +7,8 @@
 
 /* --- records --- */
 
-static void read_record(pl_reader *r, pl_record *record, size_t *numbers_total) {
+static void read_record(pl_reader *r, pl_record *record, size_t *numbers_total)
+{
     const uint32_t kind = pl_read_u(r);
     const pl_record_row *row = pl_record_row_of(kind);
     const uint32_t entries = pl_read_u(r);
@@ -38,7 +39,7 @@ static void read_record(pl_reader *r, pl_record *record, size_t *numbers_total) 
         const uint32_t constant = pl_read_index(r, r->program->constant_count, "constant");
         if (!r->failed && index >= size)
             pl_read_fail(r, "value %llu of a %s record with %llu", (unsigned long long)index, row->name,
-                 (unsigned long long)size);
+                         (unsigned long long)size);
         if (!r->failed)
             values[index] = r->program->constants[constant];
         next = index + 1;
@@ -46,7 +47,8 @@ static void read_record(pl_reader *r, pl_record *record, size_t *numbers_total) 
     *record = (pl_record){.kind = kind, .entries = entries, .size = (uint32_t)size, .values = values};
 }
 
-void pl_read_records(pl_reader *r) {
+void pl_read_records(pl_reader *r)
+{
     pl_program *program = r->program;
     const uint32_t count = pl_read_count(r, 3);
     pl_record *records = pl_read_allocate(r, count, sizeof *records);
@@ -79,7 +81,8 @@ void pl_read_records(pl_reader *r) {
 
 /* --- meshes --- */
 
-static const double *read_vectors(pl_reader *r, uint32_t count) {
+static const double *read_vectors(pl_reader *r, uint32_t count)
+{
     if (!r->failed && count > pl_read_left(r) / 24)
         pl_read_fail(r, "a mesh says it has %u vectors, more than fit into its bytes", count);
     double *vectors = pl_read_allocate(r, (size_t)count * 3, sizeof *vectors);
@@ -88,7 +91,8 @@ static const double *read_vectors(pl_reader *r, uint32_t count) {
     return vectors;
 }
 
-static void read_mesh(pl_reader *r, pl_mesh *mesh) {
+static void read_mesh(pl_reader *r, pl_mesh *mesh)
+{
     mesh->name = pl_read_index(r, r->program->string_count, "name");
     mesh->vertex_count = pl_read_u(r);
     mesh->normal_count = pl_read_u(r);
@@ -98,7 +102,8 @@ static void read_mesh(pl_reader *r, pl_mesh *mesh) {
     if (!r->failed && mesh->triangle_count > pl_read_left(r) / (mesh->normal_count ? 6 : 3))
         pl_read_fail(r, "a mesh says it has %u triangles, more than fit into its bytes", mesh->triangle_count);
     uint32_t *triangles = pl_read_allocate(r, (size_t)mesh->triangle_count * 3, sizeof *triangles);
-    uint32_t *normals = mesh->normal_count ? pl_read_allocate(r, (size_t)mesh->triangle_count * 3, sizeof *normals) : NULL;
+    uint32_t *normals =
+        mesh->normal_count ? pl_read_allocate(r, (size_t)mesh->triangle_count * 3, sizeof *normals) : NULL;
     for (size_t i = 0; i < mesh->triangle_count && !r->failed; i++) {
         for (int k = 0; k < 3; k++)
             triangles[3 * i + k] = pl_read_index(r, mesh->vertex_count, "vertex");
@@ -111,7 +116,8 @@ static void read_mesh(pl_reader *r, pl_mesh *mesh) {
         mesh->normals = NULL;
 }
 
-void pl_read_meshes(pl_reader *r) {
+void pl_read_meshes(pl_reader *r)
+{
     const uint32_t count = pl_read_count(r, 4);
     pl_mesh *meshes = pl_read_allocate(r, count, sizeof *meshes);
     for (uint32_t i = 0; i < count && !r->failed; i++)

@@ -6,9 +6,10 @@
  *     pl_program_free(program);
  *
  * A program that loads keeps all that bytecode.toml promises, so nobody checks again: indices are in range, names are
- * valid UTF-8 without NUL, constants are finite, code keeps its stack effect and ends, every cycle of nodes goes through an enter
- * node (whose symbol is a symbol node), every path draws at most PL_LIMIT_DRAWS_PER_APPLICATION times between two
- * symbols. A program is immutable and may be shared by threads; the caller's bytes aren't needed after loading. */
+ * valid UTF-8 without NUL, constants are finite, code keeps its stack effect and ends, every cycle of nodes goes
+ * through an enter node (whose symbol is a symbol node), every path draws at most PL_LIMIT_DRAWS_PER_APPLICATION
+ * times between two symbols. A program is immutable and may be shared by threads; the caller's bytes aren't needed
+ * after loading. */
 #ifndef PL_PROGRAM_H
 #define PL_PROGRAM_H
 
@@ -39,8 +40,8 @@ typedef struct pl_string {
  *   object          name · ordinal · child
  *   no_shadow       child
  *
- * name: index in program->strings. body, child, then, otherwise, symbol: index in program->nodes. code: as in the file, 0 for none, else
- * offset + 1; give it to pl_run as it is. */
+ * name: index in program->strings. body, child, then, otherwise, symbol: index in program->nodes. code: as in the
+ * file, 0 for none, else offset + 1; give it to pl_run as it is. */
 typedef struct pl_node {
     uint8_t kind;
     uint32_t symbol; /* of a symbol node: its index in program->symbols; else 0 */
@@ -60,8 +61,8 @@ typedef struct pl_transform {
     bool singular;       /* the subtree below is to be dropped and counted */
 } pl_transform;
 
-/* Settings, camera, light or texture: PL_<RECORD>_VALUES numbers, then PL_<RECORD>_ENTRY numbers an entry. What the file
- * doesn't set has its default; in entries that is 0. */
+/* Settings, camera, light or texture: PL_<RECORD>_VALUES numbers, then PL_<RECORD>_ENTRY numbers an entry. What the
+ * file doesn't set has its default; in entries that is 0. */
 typedef struct pl_record {
     uint32_t kind; /* PL_RECORD_… */
     uint32_t entries;
@@ -94,8 +95,8 @@ typedef struct pl_program {
     const uint8_t *code;
     const pl_record *records;
     const pl_mesh *meshes;
-    const pl_node *nodes; /* node 0 is the root */
-    const pl_place *places; /* of each node */
+    const pl_node *nodes;    /* node 0 is the root */
+    const pl_place *places;  /* of each node */
     const uint32_t *symbols; /* the symbol nodes, in node order */
     const uint32_t *rules;   /* the rule nodes, in node order */
 

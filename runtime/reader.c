@@ -14,7 +14,8 @@ typedef struct block {
     max_align_t memory[];
 } block;
 
-void *pl_read_allocate(pl_reader *r, size_t count, size_t size) {
+void *pl_read_allocate(pl_reader *r, size_t count, size_t size)
+{
     if (r->failed)
         return NULL;
     block *fresh = NULL;
@@ -30,7 +31,8 @@ void *pl_read_allocate(pl_reader *r, size_t count, size_t size) {
     return fresh->memory;
 }
 
-void pl_program_free(pl_program *program) {
+void pl_program_free(pl_program *program)
+{
     if (!program)
         return;
     for (block *b = program->blocks, *next; b; b = next) {
@@ -40,32 +42,37 @@ void pl_program_free(pl_program *program) {
     free(program);
 }
 
-static void fail(pl_reader *r, int code, const char *format, va_list arguments) {
+static void fail(pl_reader *r, int code, const char *format, va_list arguments)
+{
     char reason[256];
     vsnprintf(reason, sizeof reason, format, arguments);
     r->failed = true;
     pl_fail(r->error, code, r->section, "%s", reason);
 }
 
-void pl_read_fail(pl_reader *r, const char *format, ...) {
+void pl_read_fail(pl_reader *r, const char *format, ...)
+{
     va_list arguments;
     va_start(arguments, format);
     fail(r, PL_ERROR_BYTECODE, format, arguments);
     va_end(arguments);
 }
 
-void pl_read_fail_as(pl_reader *r, int code, const char *format, ...) {
+void pl_read_fail_as(pl_reader *r, int code, const char *format, ...)
+{
     va_list arguments;
     va_start(arguments, format);
     fail(r, code, format, arguments);
     va_end(arguments);
 }
 
-size_t pl_read_left(const pl_reader *r) {
+size_t pl_read_left(const pl_reader *r)
+{
     return (size_t)(r->end - r->at);
 }
 
-uint32_t pl_read_u(pl_reader *r) {
+uint32_t pl_read_u(pl_reader *r)
+{
     if (r->failed)
         return 0;
     uint64_t value = 0;
@@ -86,28 +93,32 @@ uint32_t pl_read_u(pl_reader *r) {
     return 0;
 }
 
-uint32_t pl_read_index(pl_reader *r, uint32_t limit, const char *what) {
+uint32_t pl_read_index(pl_reader *r, uint32_t limit, const char *what)
+{
     const uint32_t index = pl_read_u(r);
     if (!r->failed && index >= limit)
         pl_read_fail(r, "%s %u, but there are %u", what, index, limit);
     return r->failed ? 0 : index;
 }
 
-uint32_t pl_read_count(pl_reader *r, size_t bytes) {
+uint32_t pl_read_count(pl_reader *r, size_t bytes)
+{
     const uint32_t count = pl_read_u(r);
     if (!r->failed && count > pl_read_left(r) / bytes)
         pl_read_fail(r, "says it has %u elements, more than fit into its bytes", count);
     return r->failed ? 0 : count;
 }
 
-uint64_t pl_little_endian(const uint8_t *bytes, int count) {
+uint64_t pl_little_endian(const uint8_t *bytes, int count)
+{
     uint64_t value = 0;
     for (int i = 0; i < count; i++)
         value |= (uint64_t)bytes[i] << (8 * i);
     return value;
 }
 
-double pl_read_f64(pl_reader *r) {
+double pl_read_f64(pl_reader *r)
+{
     if (!r->failed && pl_read_left(r) < 8)
         pl_read_fail(r, "ends in the middle of a number");
     if (r->failed)

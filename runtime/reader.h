@@ -1,8 +1,8 @@
 /* reader.h - reading one section of bytecode (private to loading).
  *
- * A reader never leaves its section, and fails once and for good: after a failure every function gives zero or NULL, so
- * that decoding needs no check after every number, and loops end by `failed`. Counts are never larger than the bytes left
- * allow, so memory grows in proportion to the file. */
+ * A reader never leaves its section, and fails once and for good: after a failure every function gives zero or NULL,
+ * so that decoding needs no check after every number, and loops end by `failed`. Counts are never larger than the
+ * bytes left allow, so memory grows in proportion to the file. */
 #ifndef PL_READER_H
 #define PL_READER_H
 

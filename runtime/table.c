@@ -64,31 +64,37 @@ static const struct {
 #undef ROW
 };
 
-const pl_node_row *pl_node_row_of(uint32_t kind) {
+const pl_node_row *pl_node_row_of(uint32_t kind)
+{
     static const pl_node_row none = {NULL, NULL, 0};
     return kind < COUNT(NODES) ? &NODES[kind] : &none;
 }
 
-const pl_op_row *pl_op_row_of(uint32_t opcode) {
+const pl_op_row *pl_op_row_of(uint32_t opcode)
+{
     static const pl_op_row none = {NULL, 0, 0, 0};
     return opcode < COUNT(OPCODES) ? &OPCODES[opcode] : &none;
 }
 
-const pl_shape_row *pl_shape_row_of(uint32_t shape) {
+const pl_shape_row *pl_shape_row_of(uint32_t shape)
+{
     static const pl_shape_row none = {NULL, 0, false};
     return shape < COUNT(SHAPES) ? &SHAPES[shape] : &none;
 }
 
-const pl_record_row *pl_record_row_of(uint32_t kind) {
+const pl_record_row *pl_record_row_of(uint32_t kind)
+{
     static const pl_record_row none = {NULL, 0, 0, NULL};
     return kind < COUNT(RECORDS) ? &RECORDS[kind] : &none;
 }
 
-const char *pl_pattern_name(uint32_t pattern) {
+const char *pl_pattern_name(uint32_t pattern)
+{
     return pattern < COUNT(PATTERNS) ? PATTERNS[pattern] : NULL;
 }
 
-const char *pl_record_value_name(uint32_t kind, uint32_t offset, uint32_t *first, uint32_t *size) {
+const char *pl_record_value_name(uint32_t kind, uint32_t offset, uint32_t *first, uint32_t *size)
+{
     for (size_t i = 0; i < COUNT(VALUES); i++) {
         if (VALUES[i].kind == kind && offset >= VALUES[i].offset && offset - VALUES[i].offset < VALUES[i].size) {
             *first = VALUES[i].offset;
@@ -99,7 +105,8 @@ const char *pl_record_value_name(uint32_t kind, uint32_t offset, uint32_t *first
     return NULL;
 }
 
-const char *pl_record_entry_name(uint32_t kind, uint32_t k) {
+const char *pl_record_entry_name(uint32_t kind, uint32_t k)
+{
     for (size_t i = 0; i < COUNT(ENTRIES); i++)
         if (ENTRIES[i].kind == kind && ENTRIES[i].offset == k)
             return ENTRIES[i].name;

@@ -49,7 +49,8 @@ const char *pl_record_value_name(uint32_t kind, uint32_t offset, uint32_t *first
 const char *pl_record_entry_name(uint32_t kind, uint32_t k);
 
 /* 32-bit words that a field of this type takes in pl_node_fields. */
-static inline int pl_field_words(uint8_t type) {
+static inline int pl_field_words(uint8_t type)
+{
     return type == PL_FIELD_NODES || type == PL_FIELD_SLOTS || type == PL_FIELD_CASES ? 2 : 1;
 }
 

@@ -1,10 +1,10 @@
 /* verify.c - what must hold between the parts of a program, so that running it needs no checks.
  *
  * Code: one pass over the section follows each piece from its first byte to its `end` with the stack's depth on every
- * path (jumps only go forward, so one pass is enough), and remembers what the piece does. Nodes: each kind's fields, and
- * that its code does what such a node's code may do. Graph: a depth-first search without recursion shows that edges other
- * than enter's make no cycle, and sums up draws along the longest path of an application. Time and memory are linear in
- * the file's size. */
+ * path (jumps only go forward, so one pass is enough), and remembers what the piece does. Nodes: each kind's fields,
+ * and that its code does what such a node's code may do. Graph: a depth-first search without recursion shows that
+ * edges other than enter's make no cycle, and sums up draws along the longest path of an application. Time and memory
+ * are linear in the file's size. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,14 +15,14 @@
 
 /* What a piece of code does. */
 typedef struct piece {
-    uint32_t start, length;    /* bytes in the code section */
-    uint8_t results;           /* values that it leaves */
-    uint8_t draws;             /* most draws on a path, at most LIMIT + 1 */
-    bool assigns;              /* store, variants */
-    bool transforms;           /* an operation on the matrix */
-    bool paints;               /* texture_set */
-    bool sets_positions;       /* texture_set in entries */
-    uint32_t texture_values;   /* largest index of texture_set + 1 */
+    uint32_t start, length;  /* bytes in the code section */
+    uint8_t results;         /* values that it leaves */
+    uint8_t draws;           /* most draws on a path, at most LIMIT + 1 */
+    bool assigns;            /* store, variants */
+    bool transforms;         /* an operation on the matrix */
+    bool paints;             /* texture_set */
+    bool sets_positions;     /* texture_set in entries */
+    uint32_t texture_values; /* largest index of texture_set + 1 */
 } piece;
 
 typedef struct verifier {
@@ -32,12 +32,13 @@ typedef struct verifier {
     uint32_t piece_count;
     uint8_t *depth; /* of the stack before the instruction at each byte of code, + 1; 0: not reached */
     uint8_t *draws; /* before it, at most */
-    uint32_t *falls; /* of each record: the first colour map entry whose position is below the one before it; 0: none */
+    uint32_t *falls; /* of each record: the first colour map entry below the one before it; 0: none */
 } verifier;
 
 enum { DRAWS_TOO_MANY = PL_LIMIT_DRAWS_PER_APPLICATION + 1 };
 
-static uint8_t add_draws(uint32_t a, uint32_t b) {
+static uint8_t add_draws(uint32_t a, uint32_t b)
+{
     return (uint8_t)(a + b < DRAWS_TOO_MANY ? a + b : DRAWS_TOO_MANY);
 }
 
@@ -53,7 +54,8 @@ typedef struct instruction {
     uint32_t operand;
 } instruction;
 
-static bool decode(const verifier *v, uint32_t at, instruction *in) {
+static bool decode(const verifier *v, uint32_t at, instruction *in)
+{
     const pl_program *program = v->program;
     *in = (instruction){.start = at, .opcode = program->code[at], .row = pl_op_row_of(program->code[at])};
     if (!in->row->name)
@@ -76,7 +78,8 @@ static bool decode(const verifier *v, uint32_t at, instruction *in) {
 }
 
 /* Notes what the instruction does; draws is the number before it and becomes the number after it. */
-static bool note(const verifier *v, const instruction *in, piece *p, uint8_t *draws) {
+static bool note(const verifier *v, const instruction *in, piece *p, uint8_t *draws)
+{
     switch (in->opcode) {
     case PL_OP_RAND: *draws = add_draws(*draws, 1); break;
     case PL_OP_STORE:
@@ -99,10 +102,11 @@ static bool note(const verifier *v, const instruction *in, piece *p, uint8_t *dr
 }
 
 /* Says that `target` is reached from `in` with this depth (of the stack) and so many draws. */
-static bool reach(verifier *v, const instruction *in, uint32_t target, uint32_t depth, uint8_t draws) {
+static bool reach(verifier *v, const instruction *in, uint32_t target, uint32_t depth, uint8_t draws)
+{
     if (v->depth[target] && v->depth[target] != depth + 1)
-        return BAD_CODE(v, in->start, "leads to byte %u with %u values on the stack, another path with %u", target, depth,
-                        v->depth[target] - 1u);
+        return BAD_CODE(v, in->start, "leads to byte %u with %u values on the stack, another path with %u", target,
+                        depth, v->depth[target] - 1u);
     v->depth[target] = (uint8_t)(depth + 1);
     if (draws > v->draws[target])
         v->draws[target] = draws;
@@ -110,7 +114,8 @@ static bool reach(verifier *v, const instruction *in, uint32_t target, uint32_t 
 }
 
 /* One instruction: its effect on the stack, and where it leads. *last becomes the farthest byte jumped to. */
-static bool step(verifier *v, const instruction *in, piece *p, uint32_t *last) {
+static bool step(verifier *v, const instruction *in, piece *p, uint32_t *last)
+{
     if (!v->depth[in->start])
         return BAD_CODE(v, in->start, "%s can't be reached", in->row->name);
     uint32_t depth = v->depth[in->start] - 1u;
@@ -144,7 +149,8 @@ static bool step(verifier *v, const instruction *in, piece *p, uint32_t *last) {
     return in->opcode == PL_OP_JUMP || reach(v, in, in->next, depth, draws);
 }
 
-static bool verify_piece(verifier *v, piece *p) {
+static bool verify_piece(verifier *v, piece *p)
+{
     uint32_t at = p->start, last = p->start;
     v->depth[at] = 1;
     for (;;) {
@@ -160,10 +166,12 @@ static bool verify_piece(verifier *v, piece *p) {
 }
 
 /* Splits the code into pieces. */
-static bool verify_code(verifier *v) {
+static bool verify_code(verifier *v)
+{
     const uint32_t length = v->program->code_length;
     uint32_t capacity = 0;
-    for (uint32_t at = 0; at < length; at = v->pieces[v->piece_count - 1].start + v->pieces[v->piece_count - 1].length) {
+    for (uint32_t at = 0; at < length;
+         at = v->pieces[v->piece_count - 1].start + v->pieces[v->piece_count - 1].length) {
         if (v->piece_count == capacity) {
             capacity = capacity ? 2 * capacity : 16;
             piece *grown = realloc(v->pieces, capacity * sizeof *grown);
@@ -180,7 +188,8 @@ static bool verify_code(verifier *v) {
 }
 
 /* The piece that a node's code field means; NULL if no piece starts there. */
-static const piece *find_piece(const verifier *v, uint32_t code) {
+static const piece *find_piece(const verifier *v, uint32_t code)
+{
     uint32_t low = 0, high = v->piece_count;
     while (low < high) {
         const uint32_t middle = low + (high - low) / 2;
@@ -194,7 +203,7 @@ static const piece *find_piece(const verifier *v, uint32_t code) {
 
 /* --- nodes --- */
 
-#define BAD_NODE(v, node, format, ...)                                                              \
+#define BAD_NODE(v, node, format, ...) \
     pl_fail((v)->error, PL_ERROR_BYTECODE, "nodes", "node %u (%s): " format, (unsigned)(node), \
             pl_node_row_of((v)->program->nodes[node].kind)->name, __VA_ARGS__)
 
@@ -205,7 +214,8 @@ typedef struct use {
 } use;
 
 /* *found becomes what the code does; without code a piece that does nothing. */
-static bool verify_use(const verifier *v, uint32_t node, uint32_t code, use allowed, const piece **found) {
+static bool verify_use(const verifier *v, uint32_t node, uint32_t code, use allowed, const piece **found)
+{
     static const piece nothing = {0};
     const piece *p = code ? find_piece(v, code) : &nothing;
     *found = p;
@@ -222,7 +232,8 @@ static bool verify_use(const verifier *v, uint32_t node, uint32_t code, use allo
     return true;
 }
 
-static bool verify_texture(const verifier *v, uint32_t node, const piece *code) {
+static bool verify_texture(const verifier *v, uint32_t node, const piece *code)
+{
     const pl_node *n = &v->program->nodes[node];
     const pl_record *record = &v->program->records[n->as.texture.texture];
     if (record->kind != PL_RECORD_TEXTURE)
@@ -237,7 +248,8 @@ static bool verify_texture(const verifier *v, uint32_t node, const piece *code) 
 }
 
 /* A node's own fields. *draws becomes the most draws that its code makes. */
-static bool verify_node(const verifier *v, uint32_t node, uint8_t *draws) {
+static bool verify_node(const verifier *v, uint32_t node, uint8_t *draws)
+{
     const pl_program *program = v->program;
     const pl_node *n = &program->nodes[node];
     const piece *code = NULL;
@@ -293,7 +305,8 @@ static bool verify_node(const verifier *v, uint32_t node, uint8_t *draws) {
     return true;
 }
 
-static bool verify_records(const verifier *v) {
+static bool verify_records(const verifier *v)
+{
     static const uint32_t colours[] = {[PL_PATTERN_SOLID] = 1, [PL_PATTERN_CHECKER] = 2};
     for (uint32_t i = 0; i < v->program->record_count; i++) {
         const pl_record *record = &v->program->records[i];
@@ -301,12 +314,13 @@ static bool verify_records(const verifier *v) {
             continue;
         const double pattern = record->values[PL_TEXTURE_PATTERN];
         if (!(pattern >= 0 && pattern <= PL_PATTERN_GRADIENT && pattern == (uint32_t)pattern))
-            return pl_fail(v->error, PL_ERROR_BYTECODE, "records", "record %u: there is no pattern %.17g", i, pattern);
-        const bool fits = pattern == PL_PATTERN_GRADIENT ? record->entries >= 1
-                                                         : record->entries == colours[(uint32_t)pattern];
+            return pl_fail(v->error, PL_ERROR_BYTECODE, "records", "record %u: there is no pattern %.17g", i,
+                           pattern);
+        const bool fits =
+            pattern == PL_PATTERN_GRADIENT ? record->entries >= 1 : record->entries == colours[(uint32_t)pattern];
         if (!fits)
-            return pl_fail(v->error, PL_ERROR_BYTECODE, "records", "record %u: %u colours don't fit the pattern %s", i,
-                           record->entries, pl_pattern_name((uint32_t)pattern));
+            return pl_fail(v->error, PL_ERROR_BYTECODE, "records", "record %u: %u colours don't fit the pattern %s",
+                           i, record->entries, pl_pattern_name((uint32_t)pattern));
         for (uint32_t k = 1; pattern == PL_PATTERN_GRADIENT && k < record->entries && !v->falls[i]; k++) {
             const double *entry = record->values + PL_TEXTURE_VALUES + (size_t)k * PL_TEXTURE_ENTRY;
             if (entry[PL_TEXTURE_ENTRY_POSITION] < (entry - PL_TEXTURE_ENTRY)[PL_TEXTURE_ENTRY_POSITION])
@@ -319,7 +333,8 @@ static bool verify_records(const verifier *v) {
 /* --- graph --- */
 
 /* Child i of a node in derivation order, without an enter node's symbol; UINT32_MAX: there are no more. */
-static uint32_t child_of(const pl_program *program, uint32_t node, uint32_t i) {
+static uint32_t child_of(const pl_program *program, uint32_t node, uint32_t i)
+{
     const pl_node *n = &program->nodes[node];
     switch (n->kind) {
     case PL_NODE_BRANCH: return i == 0 ? n->as.branch.then : i == 1 ? n->as.branch.otherwise : UINT32_MAX;
@@ -352,7 +367,8 @@ enum { NEW = 0, OPEN, DONE };
 
 /* Depth first from `start` through nodes not visited before. draws[n] becomes the most draws from n to the end of the
  * application that n stands in. */
-static bool search(const verifier *v, uint32_t start, uint8_t *state, uint8_t *draws, visit *stack) {
+static bool search(const verifier *v, uint32_t start, uint8_t *state, uint8_t *draws, visit *stack)
+{
     const pl_program *program = v->program;
     uint32_t height = 0;
     stack[height++] = (visit){start, 0};
@@ -370,7 +386,8 @@ static bool search(const verifier *v, uint32_t start, uint8_t *state, uint8_t *d
             }
             draws[top->node] = add_draws(own, below);
             if (draws[top->node] == DRAWS_TOO_MANY)
-                return BAD_NODE(v, top->node, "more than %d draws in one application", PL_LIMIT_DRAWS_PER_APPLICATION);
+                return BAD_NODE(v, top->node, "more than %d draws in one application",
+                                PL_LIMIT_DRAWS_PER_APPLICATION);
             state[top->node] = DONE;
             height--;
         } else if (state[child] == OPEN) {
@@ -387,7 +404,8 @@ static bool search(const verifier *v, uint32_t start, uint8_t *state, uint8_t *d
 }
 
 /* Objects stand at the top and nowhere else. top[n] is set for the unions from the root down to the objects. */
-static bool verify_top(const verifier *v, uint8_t *top, visit *stack) {
+static bool verify_top(const verifier *v, uint8_t *top, visit *stack)
+{
     const pl_program *program = v->program;
     uint32_t height = 0;
     const uint8_t root = program->nodes[0].kind;
@@ -419,7 +437,8 @@ static bool verify_top(const verifier *v, uint8_t *top, visit *stack) {
     return true;
 }
 
-static bool verify_graph(const verifier *v) {
+static bool verify_graph(const verifier *v)
+{
     const uint32_t count = v->program->node_count;
     uint8_t *state = calloc(count, 1), *draws = calloc(count, 1), *top = calloc(count, 1);
     visit *stack = malloc(count * sizeof *stack);
@@ -436,7 +455,8 @@ static bool verify_graph(const verifier *v) {
     return fine;
 }
 
-bool pl_program_verify(const pl_program *program, pl_error *error) {
+bool pl_program_verify(const pl_program *program, pl_error *error)
+{
     verifier v = {.program = program, .error = error};
     v.depth = calloc((size_t)program->code_length + 1, 1);
     v.draws = calloc((size_t)program->code_length + 1, 1);

@@ -1,4 +1,4 @@
-"""The bytecode's sections, nodes, opcodes, shapes and records as plain rows, by name, in the order of their ids.
+"""The bytecode's sections, nodes, opcodes, shapes and records as plain rows by name, in the order of ids.
 
 Generated from runtime/bytecode.toml by runtime/generate.py, which documents every row: don't edit.
 

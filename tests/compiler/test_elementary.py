@@ -1,5 +1,5 @@
-"""The elementary functions against 200-bit arithmetic, their exact values and special cases; the random functions
-against the published test vectors and a second implementation in plain Python."""
+"""The elementary functions against 200-bit arithmetic, their exact values and special cases; the random
+functions against the published test vectors and a second implementation in plain Python."""
 
 import doctest
 import math
@@ -32,7 +32,7 @@ def ulp_of(exact) -> object:
 
 
 def error_of(result: float, exact) -> float:
-    """|result - exact| in units in the last place. An overflow's limit is half an ulp above the largest double."""
+    """|result - exact| in units in the last place. Overflow begins half an ulp above the largest double."""
     if math.isinf(result):
         return 0.0 if abs(exact) >= mp.ldexp(mp.mpf(2) - mp.ldexp(1, -53), 1023) else math.inf
     return float(abs(mp.mpf(result) - exact) / ulp_of(exact))
@@ -69,15 +69,21 @@ def angle(chosen: random.Random) -> float:
 
 def sine(chosen: random.Random) -> float:
     small = math.ldexp(1 + chosen.random(), chosen.randint(-1074, -1))
-    return chosen.choice((chosen.uniform(-1, 1), small, 1 - small, -1 + small, near(0.5, chosen), near(0.7, chosen)))
+    return chosen.choice(
+        (chosen.uniform(-1, 1), small, 1 - small, -1 + small, near(0.5, chosen), near(0.7, chosen))
+    )
 
 
 def exponent(chosen: random.Random) -> float:
-    return chosen.choice((chosen.uniform(-746, 710), chosen.uniform(-1, 1), chosen.uniform(-745.2, -707), anywhere(chosen)))
+    return chosen.choice(
+        (chosen.uniform(-746, 710), chosen.uniform(-1, 1), chosen.uniform(-745.2, -707), anywhere(chosen))
+    )
 
 
 def positive(chosen: random.Random) -> float:
-    return chosen.choice((abs(anywhere(chosen)), near(1.0, chosen), chosen.uniform(0.5, 2), chosen.uniform(1, 1e6)))
+    return chosen.choice(
+        (abs(anywhere(chosen)), near(1.0, chosen), chosen.uniform(0.5, 2), chosen.uniform(1, 1e6))
+    )
 
 
 def power(chosen: random.Random) -> tuple[float, float]:
@@ -268,7 +274,9 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("call", "expected"), CASES, ids=lambda value: str(value) if isinstance(value, tuple) else "")
+@pytest.mark.parametrize(
+    ("call", "expected"), CASES, ids=lambda value: str(value) if isinstance(value, tuple) else ""
+)
 def test_single_values(call, expected):
     result = elementary.apply(*call)
     if math.isnan(expected):
@@ -311,7 +319,7 @@ def test_documentation_examples():
     assert doctest.testmod(elementary).failed == 0
 
 
-# --- random numbers: plain Python beside the library --------------------------------------------------------------
+# --- random numbers: plain Python beside the library ---
 
 
 def finalize(z):
@@ -323,7 +331,9 @@ def finalize(z):
 
 def plain_mix(k, x):
     mask = 2**64 - 1
-    return finalize(finalize(x + RANDOM["mix_add_x"] & mask) ^ (k * RANDOM["mix_mul_k"] + RANDOM["mix_add_k"] & mask))
+    return finalize(
+        finalize(x + RANDOM["mix_add_x"] & mask) ^ (k * RANDOM["mix_mul_k"] + RANDOM["mix_add_k"] & mask)
+    )
 
 
 def plain_name_hash(name):
@@ -389,12 +399,16 @@ def test_vectors(vector):
 def test_arrays_of_keys_have_the_bits_of_single_ones():
     keys = np.array([0, 1, 2**64 - 1, 0x0123456789ABCDEF], dtype=np.uint64)
     values = np.array([0.0, -0.0, 1.5, -1e300])
-    assert elementary.mix(keys, keys[::-1]).tolist() == [plain_mix(int(k), int(x)) for k, x in zip(keys, keys[::-1])]
+    assert elementary.mix(keys, keys[::-1]).tolist() == [
+        plain_mix(int(k), int(x)) for k, x in zip(keys, keys[::-1])
+    ]
     assert elementary.bits(values).tolist() == [plain_bits(v) for v in values]
     assert elementary.unit(keys).tolist() == [plain_unit(int(k)) for k in keys]
     assert elementary.rand(keys, 5, 2).tolist() == [elementary.rand(int(k), 5, 2) for k in keys]
     assert elementary.hash(9, values, 2.0).tolist() == [elementary.hash(9, v, 2.0) for v in values]
-    assert elementary.term_key(keys, np.arange(4)).tolist() == [elementary.term_key(int(k), i) for i, k in enumerate(keys)]
+    assert elementary.term_key(keys, np.arange(4)).tolist() == [
+        elementary.term_key(int(k), i) for i, k in enumerate(keys)
+    ]
 
 
 def test_draws_are_uniform_and_streams_independent():

@@ -1,6 +1,6 @@
 """Bytecode by hand: what a test wants to say, valid or not, in the form of the disassembly → bytes.
 
-It shares nothing with the compiler's encoder but the table, and checks nothing, so that broken files can be made:
+It shares nothing with the compiler's encoder but the table, and checks nothing, to make broken files:
 
     scene = Assembly(parameters=["n"])
     init = scene.code("const 10; store n; end")
@@ -44,7 +44,9 @@ def container(sections: dict[str, bytes], *, version: int = VERSION, flags: int 
     """A file of these sections' contents, header and checksum made right."""
     body = b"".join(u(SECTIONS[name]) + u(len(content)) + content for name, content in sections.items())
     return seal(
-        MAGIC + struct.pack("<HHIIdI", version, flags, 28 + len(body), 0, SENTINEL_FLOAT, SENTINEL_INTEGER) + body
+        MAGIC
+        + struct.pack("<HHIIdI", version, flags, 28 + len(body), 0, SENTINEL_FLOAT, SENTINEL_INTEGER)
+        + body
     )
 
 
@@ -77,8 +79,8 @@ class Assembly:
         return self.constants.index(value)
 
     def code(self, text: str) -> int:
-        """Instructions separated by ';', each an opcode and its operand: a number for const (and offsets), a name for
-        load, store and variants. Returns what a node's code field holds."""
+        """Instructions separated by ';', each an opcode and its operand: a number for const and offsets,
+        a name for load, store and variants. Returns what a node's code field holds."""
         start = len(self.instructions)
         for instruction in filter(None, map(str.strip, text.split(";"))):
             name, *rest = instruction.split()
@@ -151,7 +153,9 @@ class Assembly:
         names = [self.string(name) for name in self.slots]
         sourcemap = u(1) + u(self.string(self.file)) if self.file else u(0)
         for place in self.places:
-            sourcemap += u(1) + u(place[0]) + u(place[1]) + u(place[2] - place[0]) + u(place[3]) if place else u(0)
+            sourcemap += (
+                u(1) + u(place[0]) + u(place[1]) + u(place[2] - place[0]) + u(place[3]) if place else u(0)
+            )
         encoded = [text.encode() for text in self.strings]
         return {
             "strings": u(len(encoded)) + b"".join(u(len(text)) + text for text in encoded),
@@ -186,7 +190,9 @@ def one_of_everything() -> Assembly:
     a.record("camera", location=(0, -14, 5), sky=(0, 0, 1), look_at=(0, 0, 5), has_look_at=1, angle=45)
     a.record("light", location=(20, -30, 40))
     bark = a.record("texture", ((0, 0.45, 0.3, 0.15, 0, 0),), diffuse=0.7)
-    ramp = a.record("texture", ((0, 1, 0, 0, 0, 0), (1, 0, 0, 1, 0, 0.5)), pattern="gradient", direction=(0, 0, 1))
+    ramp = a.record(
+        "texture", ((0, 1, 0, 0, 0, 0), (1, 0, 0, 1, 0, 0.5)), pattern="gradient", direction=(0, 0, 1)
+    )
     leaf = a.mesh("leaf.obj", ((0, 0, 0), (1, 0, 0), (0, 1, 0)), ((0, 1, 2),), ((0, 0, 1),), ((0, 0, 0),))
     place = (12, 1, 14, 2)
     a.node("union", place, children=(1, 2, 3))

@@ -7,9 +7,11 @@
 static int check_failures;
 
 #define CHECK(condition) \
-    ((condition) ? (void)0 : (void)(check_failures++, printf("%s:%d: not true: %s\n", __FILE__, __LINE__, #condition)))
+    ((condition) ? (void)0 \
+                 : (void)(check_failures++, printf("%s:%d: not true: %s\n", __FILE__, __LINE__, #condition)))
 
-static inline int check_result(void) {
+static inline int check_result(void)
+{
     return check_failures != 0;
 }
 

@@ -2,10 +2,10 @@
  *
  *     probe load FILE                         "ok", or "error CODE place: reason" and exit code 2, as all others do
  *     probe dump FILE                         the disassembly
- *     probe run FILE NODE KEY [name=value …]  runs the node's code (or takes its branch or choice) in a scope with this
- *                                             random key: prints values, matrix, texture, parameters, key, draws, child
- *     probe flip FILE                         flips every bit, checksum left and made right: "loaded N refused M"
- *     probe cut FILE                          the same for every length shorter than the file
+ *     probe run FILE NODE KEY [name=value …]  runs the node's code (or takes its branch or choice) in a scope with
+ * this random key: prints values, matrix, texture, parameters, key, draws, child probe flip FILE flips every bit,
+ * checksum left and made right: "loaded N refused M" probe cut FILE                          the same for every
+ * length shorter than the file
  */
 #include <inttypes.h>
 #include <math.h>
@@ -17,13 +17,15 @@
 #include "expression.h"
 #include "program.h"
 
-static int report(const pl_error *error) {
+static int report(const pl_error *error)
+{
     printf("error %d %s: %s\n", error->code, error->place, error->reason);
     return 2;
 }
 
 /* A file's bytes, at the end of their own allocation, so that reading beyond them is seen. */
-static uint8_t *read_file(const char *path, size_t *length) {
+static uint8_t *read_file(const char *path, size_t *length)
+{
     FILE *file = fopen(path, "rb");
     if (!file || fseek(file, 0, SEEK_END) != 0)
         exit(3);
@@ -36,7 +38,8 @@ static uint8_t *read_file(const char *path, size_t *length) {
     return bytes;
 }
 
-static void seal(uint8_t *bytes, size_t length) {
+static void seal(uint8_t *bytes, size_t length)
+{
     uint32_t crc = 0xFFFFFFFFu;
     for (size_t i = 28; i < length; i++) {
         crc ^= bytes[i];
@@ -47,7 +50,8 @@ static void seal(uint8_t *bytes, size_t length) {
         bytes[12 + i] = (uint8_t)((crc ^ 0xFFFFFFFFu) >> (8 * i));
 }
 
-static bool loads(const uint8_t *bytes, size_t length) {
+static bool loads(const uint8_t *bytes, size_t length)
+{
     pl_error error = {0};
     char *text = pl_disassemble(bytes, length, &error);
     if (!text && (error.code == PL_OK || error.reason[0] == '\0' || error.place[0] == '\0')) {
@@ -58,7 +62,8 @@ static bool loads(const uint8_t *bytes, size_t length) {
     return text != NULL;
 }
 
-static int flip(uint8_t *bytes, size_t length) {
+static int flip(uint8_t *bytes, size_t length)
+{
     unsigned loaded = 0, refused = 0;
     uint8_t *copy = malloc(length);
     for (size_t bit = 0; copy && bit < 8 * length; bit++) {
@@ -80,7 +85,8 @@ static int flip(uint8_t *bytes, size_t length) {
     return 0;
 }
 
-static int cut(uint8_t *bytes, size_t length) {
+static int cut(uint8_t *bytes, size_t length)
+{
     unsigned refused = 0;
     for (size_t shorter = 0; shorter < length; shorter++) {
         for (int sealed = 0; sealed < 2; sealed++) {
@@ -98,14 +104,16 @@ static int cut(uint8_t *bytes, size_t length) {
     return refused != 2 * length;
 }
 
-static void print_numbers(const char *name, const double *values, uint32_t count) {
+static void print_numbers(const char *name, const double *values, uint32_t count)
+{
     printf("%s", name);
     for (uint32_t i = 0; i < count; i++)
         printf(" %.17g", values[i]);
     printf("\n");
 }
 
-static int run(const pl_program *program, uint32_t node, uint64_t key, char **assignments) {
+static int run(const pl_program *program, uint32_t node, uint64_t key, char **assignments)
+{
     static double parameters[256], texture[256];
     pl_scope scope = {.parameters = parameters, .key = key, .symbol = UINT32_MAX};
     pl_result result = {.texture = texture};
@@ -126,7 +134,9 @@ static int run(const pl_program *program, uint32_t node, uint64_t key, char **as
     case PL_NODE_PRIMITIVE: fine = pl_run(program, node, n->as.primitive.code, &scope, &result, &error); break;
     case PL_NODE_TEXTURE: fine = pl_run(program, node, n->as.texture.code, &scope, &result, &error); break;
     case PL_NODE_CALCULATE: fine = pl_run(program, node, n->as.calculate.code, &scope, &result, &error); break;
-    case PL_NODE_TRANSFORM_CODE: fine = pl_run(program, node, n->as.transform_code.code, &scope, &result, &error); break;
+    case PL_NODE_TRANSFORM_CODE:
+        fine = pl_run(program, node, n->as.transform_code.code, &scope, &result, &error);
+        break;
     case PL_NODE_OBJECT: pl_scope_object(program, node, &scope), fine = true; break;
     case PL_NODE_SYMBOL: pl_scope_enter(program, node, &scope), fine = true; break;
     case PL_NODE_UNION: pl_scope_term(&scope, 1), fine = true; break;
@@ -142,7 +152,8 @@ static int run(const pl_program *program, uint32_t node, uint64_t key, char **as
     return 0;
 }
 
-int main(int count, char **arguments) {
+int main(int count, char **arguments)
+{
     if (count < 3)
         return 3;
     size_t length;
@@ -164,7 +175,8 @@ int main(int count, char **arguments) {
         else if (strcmp(arguments[1], "load") == 0)
             printf("ok\n");
         else if (count >= 5)
-            code = run(program, (uint32_t)strtoul(arguments[3], NULL, 10), strtoull(arguments[4], NULL, 0), arguments + 5);
+            code = run(program, (uint32_t)strtoul(arguments[3], NULL, 10), strtoull(arguments[4], NULL, 0),
+                       arguments + 5);
         pl_program_free(program);
     }
     free(bytes);

@@ -4,7 +4,8 @@
 
 static const pl_affine SAMPLE = {{2, 0, 0, 5, 0, 0, -4, 6, 0, 0.5, 0, 7}};
 
-static void composition_acts_right_to_left(void) {
+static void composition_acts_right_to_left(void)
+{
     const pl_affine move = {{1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3}}, grow = {{2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0}};
     const pl_affine both = pl_affine_multiply(&move, &grow);
     double p[3] = {1, 1, 1}, v[3] = {1, 1, 1};
@@ -14,7 +15,8 @@ static void composition_acts_right_to_left(void) {
     CHECK(v[0] == 2 && v[1] == 2 && v[2] == 2);
 }
 
-static void inverse_undoes_the_map(void) {
+static void inverse_undoes_the_map(void)
+{
     pl_affine inverse;
     CHECK(pl_affine_inverse(&SAMPLE, &inverse));
     const pl_affine product = pl_affine_multiply(&SAMPLE, &inverse), identity = pl_affine_identity();
@@ -23,7 +25,8 @@ static void inverse_undoes_the_map(void) {
     CHECK(pl_affine_determinant(&SAMPLE) == 4);
 }
 
-static void normals_stay_perpendicular(void) {
+static void normals_stay_perpendicular(void)
+{
     pl_affine inverse;
     const pl_affine shear = {{1, 3, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
     double tangent[3] = {0, 1, 0}, normal[3] = {1, 0, 0};
@@ -33,16 +36,19 @@ static void normals_stay_perpendicular(void) {
     CHECK(tangent[0] * normal[0] + tangent[1] * normal[1] + tangent[2] * normal[2] == 0);
 }
 
-static void flat_and_tiny_maps_are_singular(void) {
+static void flat_and_tiny_maps_are_singular(void)
+{
     pl_affine inverse;
-    const pl_affine flat = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0}}, tiny = {{1e-120, 0, 0, 0, 0, 1e-120, 0, 0, 0, 0, 1e-120, 0}};
+    const pl_affine flat = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0}},
+                    tiny = {{1e-120, 0, 0, 0, 0, 1e-120, 0, 0, 0, 0, 1e-120, 0}};
     const pl_affine overflowing = {{1e-200, 0, 0, 1e200, 0, 1, 0, 0, 0, 0, 1, 0}};
     CHECK(!pl_affine_inverse(&flat, &inverse));
     CHECK(!pl_affine_inverse(&tiny, &inverse));
     CHECK(!pl_affine_inverse(&overflowing, &inverse));
 }
 
-int main(void) {
+int main(void)
+{
     composition_acts_right_to_left();
     inverse_undoes_the_map();
     normals_stay_perpendicular();

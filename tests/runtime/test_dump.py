@@ -12,7 +12,7 @@ CASES = Path(__file__).resolve().parents[1] / "cases" / "disassembly"
 def dump(tmp_path, data: bytes) -> str:
     file = tmp_path / "scene.plsb"
     file.write_bytes(data)
-    done = native.run(native.build("probe.c", "sanitized"), "dump", file)
+    done = native.probe("dump", file)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -26,10 +26,27 @@ def test_one_of_everything(tmp_path):
 
 
 def test_numbers_read_back_and_are_short(tmp_path):
-    numbers = [0.1, 1 / 3, 1e-7, 5e-324, 1.7976931348623157e308, -2.5, 123456789.0, 1e22, 0.1 + 0.2, 1e15, 1e16]
+    numbers = [
+        0.1,
+        1 / 3,
+        1e-7,
+        5e-324,
+        1.7976931348623157e308,
+        -2.5,
+        123456789.0,
+        1e22,
+        0.1 + 0.2,
+        1e15,
+        1e16,
+    ]
     a = Assembly(["n"])
     a.node("object", name="", ordinal=0, child=1)
-    a.node("calculate", name="", code=a.code("; ".join(f"const {v!r}; store n" for v in numbers) + "; end"), child=2)
+    a.node(
+        "calculate",
+        name="",
+        code=a.code("; ".join(f"const {v!r}; store n" for v in numbers) + "; end"),
+        child=2,
+    )
     a.node("empty")
     shown = [line.split()[-1] for line in dump(tmp_path, a.bytes()).splitlines() if "  const " in line]
     assert [float(text) for text in shown] == numbers

@@ -17,7 +17,11 @@ if platform.machine() != "x86_64":
 
 def arguments(count: int) -> list[np.ndarray]:
     chosen = np.random.default_rng(5)
-    sizes = [chosen.uniform(-3, 3, 4000), chosen.uniform(-1000, 1000, 4000), np.exp(chosen.uniform(-700, 700, 4000))]
+    sizes = [
+        chosen.uniform(-3, 3, 4000),
+        chosen.uniform(-1000, 1000, 4000),
+        np.exp(chosen.uniform(-700, 700, 4000)),
+    ]
     return [chosen.permutation(np.concatenate(sizes)) for _ in range(count)]
 
 
@@ -25,7 +29,13 @@ def arguments(count: int) -> list[np.ndarray]:
 def test_same_bits(flags, tmp_path):
     library = tmp_path / "elementary.so"
     command = ["cc", "-std=gnu11", "-ffp-contract=off", "-fPIC", "-shared", *flags, f"-I{native.RUNTIME}"]
-    command += [f"-I{native.RUNTIME / 'include'}", "-o", str(library), str(native.RUNTIME / "elementary.c"), "-lm"]
+    command += [
+        f"-I{native.RUNTIME / 'include'}",
+        "-o",
+        str(library),
+        str(native.RUNTIME / "elementary.c"),
+        "-lm",
+    ]
     subprocess.run(command, check=True, capture_output=True)
     function = ctypes.CDLL(str(library)).pl_elementary_array
     function.argtypes = (ctypes.c_int, ctypes.c_size_t, *(ctypes.c_void_p,) * 4)

@@ -1,4 +1,4 @@
-"""What code does to a scope: values, parameters, matrices, textures, draws; and what it says when it can't."""
+"""What code does to a scope: values, parameters, matrices, textures, draws; and what it says if it can't."""
 
 import math
 
@@ -26,7 +26,7 @@ def ask(tmp_path, a: Assembly, node: int = 1, **parameters):
     file = tmp_path / "scene.plsb"
     file.write_bytes(a.bytes())
     assignments = [f"{name}={value!r}" for name, value in parameters.items()]
-    return native.run(native.build("probe.c", "sanitized"), "run", file, node, KEY, *assignments)
+    return native.probe("run", file, node, KEY, *assignments)
 
 
 def answer(tmp_path, a: Assembly, node: int = 1, **parameters) -> Answer:
@@ -61,7 +61,7 @@ def calculate(text: str, **fields) -> Assembly:
     return node("calculate", text, **fields)
 
 
-# --- values ----------------------------------------------------------------------------------------------------
+# --- values ---
 
 
 @pytest.mark.parametrize("name", sorted(elementary.PURE))
@@ -98,7 +98,7 @@ def test_textures_are_set_by_value(tmp_path):
     assert texture[22] == 0.9 and texture[32] == 0.5
 
 
-# --- matrices ----------------------------------------------------------------------------------------------------
+# --- matrices ---
 
 SIN30 = 0.5
 COS30 = elementary.cos(30.0)
@@ -132,7 +132,9 @@ def test_steps_multiply_on_the_right(tmp_path, name):
     result = answer(tmp_path, transformation(("matrix", STEPS["matrix"][0]), (name, arguments))).matrix
     for r in range(3):
         for c in range(4):
-            exact = sum(first[4 * r + k] * step[4 * k + c] for k in range(3)) + (first[4 * r + 3] if c == 3 else 0)
+            exact = sum(first[4 * r + k] * step[4 * k + c] for k in range(3)) + (
+                first[4 * r + 3] if c == 3 else 0
+            )
             assert result[4 * r + c] == pytest.approx(exact, rel=1e-15)
 
 
@@ -140,7 +142,9 @@ def test_right_angles_are_permutations(tmp_path):
     assert answer(tmp_path, transformation(("roty", (90,)))).matrix == [0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, 0]
 
 
-@pytest.mark.parametrize(("axis", "same"), [((5, 0, 0), "rotx"), ((0, 1e-200, 0), "roty"), ((0, 0, 1e200), "rotz")])
+@pytest.mark.parametrize(
+    ("axis", "same"), [((5, 0, 0), "rotx"), ((0, 1e-200, 0), "roty"), ((0, 0, 1e200), "rotz")]
+)
 def test_rot_about_an_axis_of_any_length(tmp_path, axis, same):
     result = answer(tmp_path, transformation(("rot", (30, *axis)))).matrix
     assert result == pytest.approx(list(STEPS[same][1]), abs=1e-16)
@@ -156,11 +160,14 @@ def test_without_code_the_matrix_is_the_identity(tmp_path):
     assert answer(tmp_path, a).matrix == list(IDENTITY)
 
 
-# --- random numbers ------------------------------------------------------------------------------------------------
+# --- random numbers ---
 
 
 def test_draws_count_by_stream(tmp_path):
-    a = calculate("const 3; rand; store a; const 0; rand; store b; const 3; rand; store c; end", parameters=("a", "b", "c"))
+    a = calculate(
+        "const 3; rand; store a; const 0; rand; store b; const 3; rand; store c; end",
+        parameters=("a", "b", "c"),
+    )
     result = answer(tmp_path, a)
     three, zero = elementary.bits(3.0), elementary.bits(0.0)
     assert result.parameters == [elementary.rand(KEY, *draw) for draw in ((three, 0), (zero, 0), (three, 1))]
@@ -170,7 +177,10 @@ def test_draws_count_by_stream(tmp_path):
 def test_minus_zero_is_zero_s_stream(tmp_path):
     a = calculate("const 0; negate; rand; store n; const 0; rand; store m; end")
     stream = elementary.bits(0.0)
-    assert answer(tmp_path, a).parameters == [elementary.rand(KEY, stream, 0), elementary.rand(KEY, stream, 1)]
+    assert answer(tmp_path, a).parameters == [
+        elementary.rand(KEY, stream, 0),
+        elementary.rand(KEY, stream, 1),
+    ]
 
 
 def test_hash_depends_on_seed_and_arguments_only(tmp_path):
@@ -223,17 +233,23 @@ def test_weights_that_draw_draw_once(tmp_path):
     assert result.draws == 3
 
 
-# --- errors --------------------------------------------------------------------------------------------------------
+# --- errors ---
 
 VALUES = "(n = 0, m = 2.5)"
 ERRORS = {
     "unset": (calculate("load n; store m; end"), "Op: the parameter n is read before it has a value"),
-    "infinity": (calculate("const 1; load n; divide; store m; end"), f"the parameter m would become infinity {VALUES}"),
+    "infinity": (
+        calculate("const 1; load n; divide; store m; end"),
+        f"the parameter m would become infinity {VALUES}",
+    ),
     "minus-infinity": (calculate("load n; log; store m; end"), "the parameter m would become -infinity"),
     "nan": (calculate("load n; load n; divide; store m; end"), f"the parameter m would become NaN {VALUES}"),
     "stream": (calculate("load n; log; rand; store m; end"), "argument 1 of rand is -infinity"),
     "hash": (calculate("load m; load n; load n; divide; hash 2; store m; end"), "argument 2 of hash is NaN"),
-    "variants-0": (calculate("load n; variants A; end"), "variants needs a whole number from 1 to 4294967296, not 0"),
+    "variants-0": (
+        calculate("load n; variants A; end"),
+        "variants needs a whole number from 1 to 4294967296, not 0",
+    ),
     "variants-part": (calculate("load m; variants A; end"), "not 2.5"),
     "zero-axis": (node("transform_code", "load m; load n; load n; load n; rot; end"), "rot needs an axis"),
     "angle": (node("transform_code", "load n; load n; divide; roty; end"), "argument 1 of roty is NaN"),
@@ -243,8 +259,14 @@ ERRORS = {
     ),
     "guard": (node("branch", "load n; load n; divide; end"), "the condition is NaN"),
     "argument": (node("primitive", "load n; log; end", shape="cone"), "argument 1 of cone is -infinity"),
-    "colour": (node("texture", "load n; log; texture_set 32; end", draws=0), "the texture's red would become -infinity"),
-    "finish": (node("texture", "load n; log; texture_set 22; end", draws=0), "the texture's diffuse would become"),
+    "colour": (
+        node("texture", "load n; log; texture_set 32; end", draws=0),
+        "the texture's red would become -infinity",
+    ),
+    "finish": (
+        node("texture", "load n; log; texture_set 22; end", draws=0),
+        "the texture's diffuse would become",
+    ),
     "negative-weight": (choice("const 1", "load n; const 1; subtract"), "a weight is -1"),
     "no-weight": (choice("load n", "load n"), "the weights' sum is 0"),
 }

@@ -1,5 +1,5 @@
-"""Loading bytecode: what is valid loads, everything else gives one reason, and nothing crashes (the probe runs under
-sanitizers)."""
+"""Loading bytecode: what is valid loads, everything else gives one reason, and nothing crashes (the probe
+runs under sanitizers)."""
 
 import struct
 
@@ -22,7 +22,7 @@ def scene(*nodes, parameters=(), **kind_fields) -> Assembly:
 def load(tmp_path, data: bytes):
     file = tmp_path / "scene.plsb"
     file.write_bytes(data)
-    return native.run(native.build("probe.c", "sanitized"), "load", file)
+    return native.probe("load", file)
 
 
 def refusal(tmp_path, data: bytes, code: int = BYTECODE) -> str:
@@ -46,7 +46,7 @@ def test_an_empty_scene_loads(tmp_path):
 def test_every_flipped_bit_is_survived(tmp_path):
     file = tmp_path / "scene.plsb"
     file.write_bytes(one_of_everything().bytes())
-    done = native.run(native.build("probe.c", "sanitized"), "flip", file)
+    done = native.probe("flip", file)
     assert done.returncode == 0, done.stdout + done.stderr
     loaded, refused = map(int, done.stdout.split()[1::2])
     assert loaded + refused == 16 * file.stat().st_size and refused > loaded
@@ -55,7 +55,7 @@ def test_every_flipped_bit_is_survived(tmp_path):
 def test_every_truncation_is_refused(tmp_path):
     file = tmp_path / "scene.plsb"
     file.write_bytes(one_of_everything().bytes())
-    done = native.run(native.build("probe.c", "sanitized"), "cut", file)
+    done = native.probe("cut", file)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -89,7 +89,10 @@ def with_section(name: str, content: bytes) -> bytes:
 
 
 SECTIONS = {
-    "long-number": (with_section("strings", b"\x81\x00"), "strings: has a number that isn't in its shortest form"),
+    "long-number": (
+        with_section("strings", b"\x81\x00"),
+        "strings: has a number that isn't in its shortest form",
+    ),
     "huge-number": (with_section("code", b"\xff\xff\xff\xff\x7f"), "code: has a number that isn't"),
     "endless-number": (with_section("code", b"\xff"), "code: ends in the middle of a number"),
     "too-many-bytes": (with_section("parameters", b"\x00\x00"), "parameters: 1 bytes too many"),
@@ -100,16 +103,28 @@ SECTIONS = {
     "overlong-utf-8": (with_section("strings", u(2) + u(0) + u(2) + b"\xc0\xaf"), "string 1 isn't UTF-8"),
     "surrogate": (with_section("strings", u(2) + u(0) + u(3) + b"\xed\xa0\x80"), "string 1 isn't UTF-8"),
     "escape-sequence": (with_section("strings", u(2) + u(0) + u(4) + b"\x1b[2J"), "string 1 isn't UTF-8"),
-    "nan": (with_section("constants", u(1) + struct.pack("<d", float("nan"))), "constants: has a number that is NaN"),
+    "nan": (
+        with_section("constants", u(1) + struct.pack("<d", float("nan"))),
+        "constants: has a number that is NaN",
+    ),
     "infinity": (with_section("constants", u(1) + struct.pack("<d", float("inf"))), "NaN or infinite"),
     "minus-zero": (with_section("constants", u(1) + struct.pack("<d", -0.0)), "constant 0 is -0"),
-    "twice": (with_section("constants", u(2) + struct.pack("<2d", 5, 5)), "the constant 5 stands there twice"),
+    "twice": (
+        with_section("constants", u(2) + struct.pack("<2d", 5, 5)),
+        "the constant 5 stands there twice",
+    ),
     "parameter-name": (with_section("parameters", u(1) + u(99)), "parameters: name 99, but there are"),
     "record-kind": (with_section("records", u(1) + u(9) + u(0) + u(0)), "records: there is no record kind 9"),
     "two-cameras": (with_section("records", u(2) + 2 * (u(2) + u(0) + u(0))), "records: two camera records"),
     "camera-entries": (with_section("records", u(1) + u(2) + u(1) + u(0)), "a camera record has no entries"),
-    "value-index": (with_section("records", u(1) + u(2) + u(0) + u(1) + u(20) + u(0)), "value 20 of a camera record"),
-    "solid-colours": (with_section("records", u(5) + 5 * (u(4) + u(2) + u(0))), "2 colours don't fit the pattern solid"),
+    "value-index": (
+        with_section("records", u(1) + u(2) + u(0) + u(1) + u(20) + u(0)),
+        "value 20 of a camera record",
+    ),
+    "solid-colours": (
+        with_section("records", u(5) + 5 * (u(4) + u(2) + u(0))),
+        "2 colours don't fit the pattern solid",
+    ),
     "mesh-vertices": (with_section("meshes", u(1) + u(0) + u(2**32 - 1) + u(0) + u(0)), "more than fit"),
     "mesh-triangle": (
         with_section("meshes", u(1) + u(0) + u(1) + u(0) + u(1) + bytes(24) + u(0) + u(1) + u(0)),
@@ -131,12 +146,16 @@ def test_bad_section(tmp_path, case):
 def test_sections_out_of_order(tmp_path):
     sections = one_of_everything().sections()
     first = sections.pop("strings")
-    assert "section 2 stands where the strings (1) should" in refusal(tmp_path, container({**sections, "strings": first}))
+    assert "section 2 stands where the strings (1) should" in refusal(
+        tmp_path, container({**sections, "strings": first})
+    )
 
 
 def test_colour_maps_without_end_hit_a_limit_with_a_name(tmp_path):
     content = u(1) + u(4) + u(2**31) + u(1) + u(0) + u(0)
-    assert "more than 16777216 numbers in records" in refusal(tmp_path, with_section("records", content), LIMIT)
+    assert "more than 16777216 numbers in records" in refusal(
+        tmp_path, with_section("records", content), LIMIT
+    )
 
 
 PRIMITIVE = ("primitive", {"shape": "sphere", "code": 0})
@@ -171,12 +190,18 @@ CODE = {
         "values on the stack, another path with",
     ),
     "jump-outside": (calculation("jump 100; end"), "jump leaves the code"),
-    "jump-into": (calculation("const 1; jump_if_zero 1; const 1; store n; end"), "a jump leads into the middle of"),
+    "jump-into": (
+        calculation("const 1; jump_if_zero 1; const 1; store n; end"),
+        "a jump leads into the middle of",
+    ),
     "unreachable": (calculation("jump 2; const 1; end"), "byte 2: const can't be reached"),
     "end-too-early": (calculation("const 1; jump_if_zero 1; end; end"), "end stands before the byte 5"),
     "hash-of-nothing": (calculation("hash 0; store n; end"), "hash of 0 arguments, not 1 to 16"),
     "transforms": (calculation("const 1; rotx; end"), "its code transforms, as only a transformation may"),
-    "assigns": (calculation("const 1; store n; end", "transform_code"), "its code assigns, as only a calculation may"),
+    "assigns": (
+        calculation("const 1; store n; end", "transform_code"),
+        "its code assigns, as only a calculation may",
+    ),
     "paints": (calculation("const 1; texture_set 22; end"), "its code sets a texture, as only a texture may"),
     "pattern": (calculation("const 1; texture_set 0; end"), "texture_set changes the pattern"),
     "two-tests": (calculation("const 1; const 1; end", "branch"), "its code leaves 2 values, not 1"),
@@ -223,7 +248,10 @@ def textured(entries, code="", draws=0, **values) -> Assembly:
 COLOUR = (0, 1, 1, 1, 0, 0)
 GRAPHS = {
     "child": (scene(("no_shadow", {"child": 7})), "nodes: node 7, but there are 2"),
-    "cycle": (scene(("no_shadow", {"child": 2}), ("no_shadow", {"child": 1})), "contains itself without entering"),
+    "cycle": (
+        scene(("no_shadow", {"child": 2}), ("no_shadow", {"child": 1})),
+        "contains itself without entering",
+    ),
     "symbol-cycle": (
         scene(("symbol", {"name": "", "live": (), "draws": 0, "body": 1})),
         "contains itself without entering",
@@ -231,18 +259,27 @@ GRAPHS = {
     "enter-nothing": (scene(("enter", {"symbol": 0})), "node 1 (enter): node 0 is no symbol"),
     "one-term": (scene(("union", {"children": (2,)}), PRIMITIVE), "1 terms, at least 2"),
     "no-cases": (scene(("choose", {"cases": ()})), "there are no cases"),
-    "draws-flag": (scene(("symbol", {"name": "", "live": (), "draws": 2, "body": 2}), PRIMITIVE), "draws is 2, not 0 or 1"),
+    "draws-flag": (
+        scene(("symbol", {"name": "", "live": (), "draws": 2, "body": 2}), PRIMITIVE),
+        "draws is 2, not 0 or 1",
+    ),
     "shape": (scene(("primitive", {"shape": 99, "code": 0})), "there is no shape 99"),
     "missing-argument": (scene(("primitive", {"shape": "torus", "code": 0})), "leaves 0 values, not 1"),
     "no-texture": (textured((COLOUR,)), None),
     "texture-range": (textured((COLOUR,), "const 1; texture_set 37; end"), "its code sets value 37 of 37"),
-    "texture-draws": (textured((COLOUR,), "const 1; rand; texture_set 22; end"), "draws is 0, but its code draws 1"),
+    "texture-draws": (
+        textured((COLOUR,), "const 1; rand; texture_set 22; end"),
+        "draws is 0, but its code draws 1",
+    ),
     "falling-map": (
         textured(((1, *COLOUR[1:]), COLOUR), pattern="gradient"),
         "the colour map's position 1 is below the one before it",
     ),
     "unknown-pattern": (textured((COLOUR,), pattern=1.5), "there is no pattern 1.5"),
-    "inner-object": (scene(("object", {"name": "", "ordinal": 0, "child": 2}), PRIMITIVE), "an object stands below it"),
+    "inner-object": (
+        scene(("object", {"name": "", "ordinal": 0, "child": 2}), PRIMITIVE),
+        "an object stands below it",
+    ),
     "live-order": (None, "a symbol's live parameters don't rise: 0 after 1"),
 }
 
