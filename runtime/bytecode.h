@@ -142,7 +142,7 @@ enum pl_field_id {
     X(OBJECT, "child", PL_FIELD_NODE) \
     X(NO_SHADOW, "child", PL_FIELD_NODE)
 
-/* A node's fields in memory. A list is the index of its first element in a pool of the program and a count.
+/* A node's fields in memory. A list is the index of its first element in a pool and a count.
  * `words` are the same numbers in file order; a list takes two of them, every other field one. */
 enum { PL_NODE_WORDS = 5 };
 typedef union pl_node_fields {

@@ -215,8 +215,8 @@ static bool rotation(const double a[4], pl_affine *out)
     y /= length;
     z /= length;
     const double c = pl_cos(a[0]), s = pl_sin(a[0]), t = 1 - c;
-    *out = (pl_affine){{t * x * x + c, t * x * y - s * z, t * x * z + s * y, 0, /**/
-                        t * x * y + s * z, t * y * y + c, t * y * z - s * x, 0, /**/
+    *out = (pl_affine){{t * x * x + c, t * x * y - s * z, t * x * z + s * y, 0,
+                        t * x * y + s * z, t * y * y + c, t * y * z - s * x, 0,
                         t * x * z - s * y, t * y * z + s * x, t * z * z + c, 0}};
     return true;
 }

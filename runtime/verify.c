@@ -30,8 +30,8 @@ typedef struct verifier {
     pl_error *error;
     piece *pieces;
     uint32_t piece_count;
-    uint8_t *depth; /* of the stack before the instruction at each byte of code, + 1; 0: not reached */
-    uint8_t *draws; /* before it, at most */
+    uint8_t *depth;  /* of the stack before the instruction at each byte of code, + 1; 0: not reached */
+    uint8_t *draws;  /* before it, at most */
     uint32_t *falls; /* of each record: the first colour map entry below the one before it; 0: none */
 } verifier;
 
