@@ -14,27 +14,26 @@ from .diagnostics import Diagnostics
 from .model import Assign, Branch, Calculate, Choose, Constant, Enter, Model, Operand, Produce, Production, Symbol
 from .walk import Way, decided, draws, is_open, leaves, reached_symbols, reads, seed_of, ways
 
+# An endless recursion is legal iff every way round it contracts, because then a detail cut-off ends it. No back end
+# has one yet. Once one has, the judgement is the forecast's, which knows the matrices of states (graph.contraction).
+CONTRACTING_IS_LEGAL = False
+
 
 def check_recursion(model: Model, diagnostics: Diagnostics) -> None:
     """Report on the recursions that the scene's objects lead to."""
     seed, names = seed_of(model), reached_symbols(model)
     reached = {name: symbol for name, symbol in model.symbols.items() if name in names}
-    endless = _endless(reached, seed)
-    for component in components({name: entered(symbol) for name, symbol in reached.items()}):
+    found = components({name: entered(symbol) for name, symbol in reached.items()})
+    endless = _endless(reached, found, seed)
+    for component in found:
         members = [reached[name] for name in reached if name in component]
         if not _is_cycle(members):
             continue
         if component & endless:
-            if not may_be_endless(model, component):
+            if not CONTRACTING_IS_LEGAL:
                 _report_endless(members[0], members, diagnostics)
         else:
             _check_cycle(members, component, seed, diagnostics)
-
-
-def may_be_endless(model: Model, component: frozenset[str]) -> bool:
-    """Whether an endless recursion through the symbols of ``component`` is legal: it is iff every cycle contracts,
-    because then a detail cut-off ends it. No back end has that cut-off, so none is legal."""
-    return False
 
 
 def _report_endless(symbol: Symbol, members: list[Symbol], diagnostics: Diagnostics) -> None:
@@ -42,6 +41,7 @@ def _report_endless(symbol: Symbol, members: list[Symbol], diagnostics: Diagnost
     through = f" (through {others})" if others else ""
     message = f"'{symbol.name}' never ends: each of its rules leads back to it{through}"
     hint = f"count down: if (n > 0) {symbol.name} -> … [ --n ] {symbol.name}; and a rule for the end"
+    hint += "\n(what shrinks for ever needs an end too: there is no detail cut-off yet)"
     diagnostics.add("endless", symbol.name_span, message, hint)
 
 
@@ -53,16 +53,18 @@ def _is_cycle(members: list[Symbol]) -> bool:
     return len(members) > 1 or members[0].name in entered(members[0])
 
 
-def _endless(symbols: dict[str, Symbol], seed: float) -> set[str]:
-    """The symbols none of whose derivations is finite: the complement of a least fixpoint."""
+def _endless(symbols: dict[str, Symbol], found: list[frozenset[str]], seed: float) -> set[str]:
+    """The symbols none of whose derivations is finite: the complement of a least fixpoint, component by component
+    (what a component enters comes before it)."""
     ending: set[str] = set()
-    changed = True
-    while changed:
-        changed = False
-        for name, symbol in symbols.items():
-            if name not in ending and _ends(symbol.production, ending, seed):
-                ending.add(name)
-                changed = True
+    for component in found:
+        changed = True
+        while changed:
+            changed = False
+            for name in component - ending:
+                if _ends(symbols[name].production, ending, seed):
+                    ending.add(name)
+                    changed = True
     return set(symbols) - ending
 
 

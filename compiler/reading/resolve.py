@@ -82,6 +82,10 @@ class _Resolver:
         model.parameters = [name for name, entry in entries.items() if entry.kind == "parameter"]
         self.resolve_settings()
         self.resolve_inputs()
+        # In the text's order, so that long chains of constants need no deep recursion.
+        for entry in list(entries.values()):
+            if entry.kind == "value":
+                self.reporting(lambda: self.constant_of(entry, entry.definition.span))
         for entry in list(entries.values()):
             if isinstance(entry.node, syntax.Selection):
                 model.symbols[entry.definition.name] = self.rules.selection(entry.node)

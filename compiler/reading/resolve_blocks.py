@@ -54,7 +54,7 @@ class Blocks:
         items, rows = self._items(block), PROPERTIES["global_settings"]
         while items:
             try:
-                row = rows.get(items.word())
+                row = rows.get(items.plain_word())
                 if row is None:
                     raise items.misfit(list(rows))
                 items.take()
@@ -90,7 +90,7 @@ class Blocks:
                 if word in TRANSFORMATIONS:
                     span = items.take().span
                     raise Problem("unsupported", span, "the camera can't be transformed", "set location and look_at")
-                row = rows.get(word)
+                row = rows.get(items.plain_word())
                 if row is None:
                     raise items.misfit(list(rows))
                 name = items.take()
@@ -131,7 +131,7 @@ class Blocks:
         values: Values = {"location": items.vector("the light's location")}
         while items:
             word = items.word()
-            row = rows.get(word)
+            row = rows.get(items.plain_word())
             if word in TRANSFORMATIONS:
                 matrix = self.textures.moved(items)
                 values["location"] = affine.transform_point(matrix, values["location"])

@@ -187,7 +187,9 @@ class Expressions:
 
     def _binary(self, node: syntax.Binary, scope: Scope) -> Value:
         left, right = self._value(node.left, scope), self._value(node.right, scope)
-        operation = BINARY[node.operator]
+        operation = BINARY.get(node.operator, "")
+        if not operation:
+            raise Problem  # a broken expression, which has been reported
         if left.kind == right.kind == "number":
             return Value("number", (Apply(operation, (left.parts[0], right.parts[0]), node.span),), node.span)
         sizes = {len(value.parts) for value in (left, right) if value.kind != "number"}

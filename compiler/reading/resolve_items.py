@@ -32,7 +32,8 @@ class Items:
     def __init__(
         self, what: str, span: Span, items: Sequence[syntax.Item], expressions: Expressions, scope: Scope
     ) -> None:
-        self.what, self.span, self.items = what, span, items
+        self.what, self.span = what, span
+        self.items = [part for item in items for part in _spread(item, expressions)]
         self.expressions, self.scope, self.at = expressions, scope, 0
 
     @property
@@ -183,12 +184,25 @@ class Items:
             return Problem()
         if name.name in vocabulary.UNSUPPORTED:
             return unsupported(name)
+        if name.name in rows and isinstance(item, syntax.Block):
+            return Problem("wrong-value", item.span, f"'{name.name}' takes no block")
+        if name.name in rows:
+            return Problem("missing", name.span, f"'{name.name}' needs a block", f"write {name.name} {{ … }}")
         message = f"{self.what} has no '{name.name}'"
         hint = nearest(name.name, rows)
         if not hint and rows:
             hint = f"it has: {' '.join(rows)}"
         code = "wrong-kind" if vocabulary.kind_of(name.name) or name.name in self.expressions.names.entries else "unknown-name"
         return Problem(code, name.span, message, hint)
+
+
+def _spread(item: syntax.Item, expressions: Expressions) -> list[syntax.Item]:
+    """``phong(0.5)`` is the property and its value, as in POV-Ray, if it calls nothing."""
+    if not isinstance(item, syntax.Call):
+        return [item]
+    name = item.name.name
+    calls = name in vocabulary.FUNCTIONS or name in expressions.names.entries or name == "mesh"
+    return [item] if calls else [item.name, *item.arguments]
 
 
 def check_range(row: Row, value: float, span: Span) -> None:

@@ -25,6 +25,10 @@ from .vocabulary import BLOCKS as BLOCK_ROWS
 from .vocabulary import MODIFIERS
 
 
+# Declared objects in declared objects double quickly; a million parts is more than a text should hold.
+MAX_PARTS = 1_000_000
+
+
 @dataclass
 class Placed:
     """An object as it is put together: the operand so far, then modifiers from the innermost outwards. The
@@ -65,6 +69,7 @@ class Objects:
     ) -> None:
         self.names, self.expressions, self.textures = names, expressions, textures
         self.rules, self.add_mesh = rules, add_mesh
+        self._sizes: dict[int, tuple[int, Operand]] = {}
 
     def object(self, block: syntax.Block) -> Operand:
         """The operand of a scene block that makes an object. Raises Problem."""
@@ -84,7 +89,20 @@ class Objects:
         else:
             placed = Placed(shape(items, name), compound=False)
         self.modify(placed, items)
+        if self._size(placed.operand) > MAX_PARTS:
+            message = f"this object has more than {MAX_PARTS:,} parts"
+            raise Problem("limit", block.name.span, message, "let a Selection make what repeats: it is never copied")
         return placed
+
+    def _size(self, operand: Operand) -> int:
+        """How many leaves the operand has, shared parts counted wherever they stand."""
+        while isinstance(operand, Prefixed):
+            operand = operand.operand
+        if not isinstance(operand, Sum):
+            return 1
+        if id(operand) not in self._sizes:
+            self._sizes[id(operand)] = (sum(map(self._size, operand.terms)), operand)  # kept: its id stays its own
+        return self._sizes[id(operand)][0]
 
     # --- what is placed
 

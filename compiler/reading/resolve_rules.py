@@ -40,6 +40,9 @@ from .resolve_operators import Operators
 from .resolve_textures import Textures
 from .source import Span
 
+# Far above what people write; a chain of nested ifs without else doubles with each.
+MAX_CASES = 10_000
+
 OPERAND_KINDS = ("selection", "primitive")
 
 
@@ -59,6 +62,7 @@ class Rules:
         self.rules = 0
         self.entries: dict[str, tuple[Operator, ...]] = {}
         self._reached: dict[str, frozenset[str]] | None = None
+        self._counted: dict[int, tuple[int, Production]] = {}
 
     # --- Selections
 
@@ -75,7 +79,22 @@ class Rules:
                 message = "this rule can't be reached: the one before it always applies"
                 self.names.diagnostics.add("unreachable-rule", after.span, message, "give the first an `if`", (note,))
             rest = self._production(production, node, rest, firsts[i])
+            if self._cases(rest) > MAX_CASES:
+                message = f"the rules of '{node.name.name}' make more than {MAX_CASES:,} cases"
+                hint = "an inner if without an else goes on with all that follows: give it an else"
+                self.names.diagnostics.add("limit", node.name.span, message, hint)
+                rest = Empty(node.span)
+                break
         return Symbol(node.name.name, rest, node.span, node.name.span)
+
+    def _cases(self, production: Production) -> int:
+        """How many leaves the tree of guards has, its shared parts counted wherever they stand."""
+        if not isinstance(production, Branch):
+            return 1
+        if id(production) not in self._counted:
+            count = self._cases(production.then) + self._cases(production.otherwise)
+            self._counted[id(production)] = (count, production)  # kept, so that its id stays its own
+        return self._counted[id(production)][0]
 
     def _numbered(self, production: syntax.Production) -> int:
         """The number of the first of the production's rules; the others follow in text order."""

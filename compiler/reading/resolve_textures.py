@@ -83,7 +83,7 @@ class Textures:
         self.names, self.expressions = names, expressions
 
     def items(self, block: syntax.Block, scope: Scope) -> Items:
-        return Items(block.name.name, block.span, block.items, self.expressions, scope)
+        return Items(f"'{block.name.name}'", block.span, block.items, self.expressions, scope)
 
     # --- named ones
 
@@ -162,11 +162,11 @@ class Textures:
         items = self.items(block, scope)
         pigment: Pigment = self._named(items, "pigment") or base or Pigment()
         while items:
-            word = items.word()
-            if word == "checker":
+            word, is_block = items.word(), isinstance(items.peek(), syntax.Block)
+            if word == "checker" and not is_block:
                 items.take()
                 pigment = replace(pigment, pattern="checker", entries=self._checkers(items))
-            elif word == "gradient":
+            elif word == "gradient" and not is_block:
                 items.take()
                 span = items.peek().span if items else block.span
                 direction = items.vector("the gradient's direction")
@@ -174,7 +174,7 @@ class Textures:
                     raise Problem("degenerate", span, "the gradient's direction is zero")
                 entries = pigment.entries if len(pigment.entries) > 1 and pigment.pattern != "checker" else GREYS
                 pigment = replace(pigment, pattern="gradient", direction=direction, entries=entries)
-            elif word in ("color_map", "colour_map"):
+            elif word in ("color_map", "colour_map") and is_block:
                 pigment = replace(pigment, entries=self.color_map(items.take(), scope))
                 if pigment.pattern == "checker":
                     raise Problem("wrong-value", block.span, "a checker takes two colours, not a color_map")
@@ -227,7 +227,7 @@ class Textures:
         while items:
             word = items.word()
             row = rows.get(word)
-            if row is None:
+            if row is None or (isinstance(items.peek(), syntax.Block) and word != "reflection"):
                 raise self._misfit(items, "finish", list(rows))
             item = items.take()
             if row.type == "colour":

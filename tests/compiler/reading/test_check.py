@@ -177,3 +177,22 @@ def test_an_editors_open_files_are_what_is_included(tmp_path):
 @pytest.mark.parametrize("text", ["object { }", "union { }", "sphere { }", "camera { location }", "#declare A = texture { }", "mesh { }"])
 def test_empty_things_never_crash(text):
     read(text)
+
+
+# --- bounded work on hostile scenes
+
+
+def test_objects_that_double_are_bounded():
+    lines = ["#declare A0 = union { sphere { 0, 1 } sphere { x, 1 } }"]
+    lines += [f"#declare A{i + 1} = union {{ object {{ A{i} }} object {{ A{i} translate x }} }}" for i in range(40)]
+    assert "limit" in codes("\n".join(lines) + "\nobject { A40 }")
+
+
+def test_guards_that_double_are_bounded():
+    rules = " ".join(f"if (rand({i}) < 0.5) if (rand({i}) < 0.5) A -> box;" for i in range(40))
+    assert codes(f"object {{ A }} Selection A {{ {rules} }}") == ["limit"]
+
+
+def test_long_chains_of_constants():
+    lines = ["#declare a0 = 1;"] + [f"#declare a{i + 1} = a{i} + 1;" for i in range(3000)]
+    assert codes("\n".join(lines) + "\nsphere { 0, a3000 }") == []
