@@ -32,7 +32,7 @@ typedef struct pl_bounce {
 struct pl_shader {
     const pl_view *view;
     pl_tracer *tracer;
-    pl_hit hit;
+    pl_hit hit, blocker; /* of the ray being shaded; of its shadow ray */
     pl_bounce *waiting;
     size_t count, capacity;
     uint32_t sample_rays;
@@ -90,6 +90,7 @@ pl_shader *pl_shader_create(const pl_view *view, pl_error *error)
     }
     shader->view = view;
     pl_hit_init(&shader->hit);
+    pl_hit_init(&shader->blocker);
     shader->tracer = pl_tracer_create(view->scene, error);
     if (shader->tracer) return shader;
     pl_shader_destroy(shader);
@@ -101,6 +102,7 @@ void pl_shader_destroy(pl_shader *shader)
     if (!shader) return;
     if (shader->tracer) pl_tracer_destroy(shader->tracer);
     pl_hit_free(&shader->hit);
+    pl_hit_free(&shader->blocker);
     free(shader->waiting);
     free(shader);
 }
@@ -126,28 +128,49 @@ typedef struct pl_shadow {
     bool failed;
 } pl_shadow;
 
+/* What a surface on the way to the light lets through. */
+static bool passes(pl_shader *shader, const pl_ray *ray, const pl_hit *hit, double through[3], pl_error *error)
+{
+    pl_surface surface;
+    pl_pigment pigment;
+    if (!pl_trace_surface(shader->tracer, ray, hit, &surface, error) ||
+        !pl_texture_pigment(surface.texture, surface.entries, surface.pattern_point, &pigment, error))
+        return false;
+    pl_pigment_through(&pigment, through);
+    return true;
+}
+
 /* One surface between a point and the light. */
 static bool cross(void *context, const pl_hit *hit)
 {
     pl_shadow *shadow = context;
-    pl_surface surface;
-    pl_pigment pigment;
     double through[3];
     if (shadow->shader->view->povray_epsilon) {
         if (!(hit->t - shadow->last > POVRAY_SHADOW)) return true;
-        if (!(hit->t - shadow->last < POVRAY_FARTHEST)) return false;
         shadow->last = hit->t;
     }
-    if (!pl_trace_surface(shadow->shader->tracer, shadow->ray, hit, &surface, shadow->error) ||
-        !pl_texture_pigment(surface.texture, surface.entries, surface.pattern_point, &pigment, shadow->error)) {
-        shadow->failed = true;
-        return false;
-    }
-    pl_pigment_through(&pigment, through);
+    shadow->failed = !passes(shadow->shader, shadow->ray, hit, through, shadow->error);
+    if (shadow->failed) return false;
     for (int c = 0; c < 3; c++) shadow->color[c] *= through[c];
     if (!pl_is_dark(shadow->color)) return true;
     memset(shadow->color, 0, 3 * sizeof *shadow->color);
     return false;
+}
+
+/* Filters the colour by all surfaces along the ray, in order. The nearest one is looked at first: where there is none,
+ * or it is opaque, the others don't matter and needn't be found. */
+static bool filter_light(pl_shader *shader, const pl_ray *ray, double color[3], pl_error *error)
+{
+    double through[3];
+    if (!pl_trace_nearest(shader->tracer, ray, &shader->blocker, error)) return false;
+    if (shader->blocker.t == INFINITY) return true;
+    if (!passes(shader, ray, &shader->blocker, through, error)) return false;
+    if (through[0] == 0.0 && through[1] == 0.0 && through[2] == 0.0) {
+        memset(color, 0, 3 * sizeof *color);
+        return true;
+    }
+    pl_shadow state = {.shader = shader, .ray = ray, .color = color, .error = error};
+    return pl_trace_all(shader->tracer, ray, cross, &state, error) && !state.failed;
 }
 
 /* Makes the arriving colour what is left of it behind everything between the point and the light. */
@@ -159,17 +182,15 @@ static bool shadow_light(pl_shader *shader, const pl_spotted *at, const double t
     memcpy(ray.origin, at->point, sizeof ray.origin);
     memcpy(ray.direction, towards, sizeof ray.direction);
     ray.t_min = view->povray_epsilon ? POVRAY_SHADOW : at->epsilon / fmax(cosine, STEEPEST);
-    ray.t_max = distance - (view->povray_epsilon ? POVRAY_SHADOW : at->epsilon);
+    ray.t_max = view->povray_epsilon ? fmin(distance - POVRAY_SHADOW, POVRAY_FARTHEST) : distance - at->epsilon;
     if (!(ray.t_min < ray.t_max)) return true;
     shader->rays.shadow++;
     if (view->all_opaque) {
-        if (view->povray_epsilon) ray.t_max = fmin(ray.t_max, POVRAY_FARTHEST);
         const int found = pl_trace_any(shader->tracer, &ray, error);
         if (found > 0) memset(color, 0, 3 * sizeof *color);
         return found >= 0;
     }
-    pl_shadow state = {.shader = shader, .ray = &ray, .color = color, .error = error};
-    return pl_trace_all(shader->tracer, &ray, cross, &state, error) && !state.failed;
+    return filter_light(shader, &ray, color, error);
 }
 
 /* --- light on a surface (section 2) --- */
