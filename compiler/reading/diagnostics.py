@@ -17,6 +17,7 @@ Example::
 from __future__ import annotations
 
 import difflib
+import os
 from dataclasses import dataclass, field
 from typing import Iterable
 
@@ -24,6 +25,9 @@ from .codes import CODES
 from .source import Span
 
 SEVERITIES = ("error", "warning", "info")
+
+# From this number of candidates on, nearest() compares the likeliest ones only.
+MANY_NAMES = 400
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +100,15 @@ class Diagnostics:
 
 def nearest(name: str, candidates: Iterable[str]) -> str:
     """A hint that names the closest candidate, or ''."""
-    matches = difflib.get_close_matches(name, list(candidates), n=1, cutoff=0.6)
+    names = list(candidates)
+    if len(names) > MANY_NAMES:
+        # Comparing takes some 20 µs a name: of many, look only at those of like length that begin or end alike.
+        head, tail, length = name[:2].lower(), name[-2:].lower(), len(name)
+        alike = [other for other in names if abs(len(other) - length) <= 2]
+        alike = [other for other in alike if other[:2].lower() == head or other[-2:].lower() == tail]
+        alike.sort(key=lambda other: -len(os.path.commonprefix((name, other))))
+        names = alike[: MANY_NAMES // 4]
+    matches = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return f"did you mean '{matches[0]}'?" if matches else ""
 
 

@@ -8,6 +8,7 @@ Example: ``first_error(reading, node)`` on ``camera { location @ }`` is the diag
 from __future__ import annotations
 
 import re
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from .codes import CODES
@@ -16,7 +17,7 @@ from .grammar import language
 from .source import Source, Span
 
 if TYPE_CHECKING:
-    from tree_sitter import Node, Tree
+    from tree_sitter import Node, Query, Tree
 
     from .parse_values import Reading
 
@@ -118,6 +119,13 @@ def clean(source: Source, diagnostics: Diagnostics) -> bytes:
         diagnostics.add("encoding", Span(source, at, at + 1), "a NUL byte stands in the text", hint)
         data = data.replace(b"\0", b" ")
     return data
+
+
+@cache
+def _directive_query() -> Query:
+    from tree_sitter import Query
+
+    return Query(language(), "(directive) @directive")
 
 
 def extras(reading: Reading, tree: Tree) -> None:

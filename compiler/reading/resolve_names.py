@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Callable, Iterable, Iterator
+from typing import Callable, Iterable, Iterator, Sequence
 
 from . import syntax, vocabulary
 from .diagnostics import Diagnostics, Note, nearest
@@ -52,7 +52,12 @@ class Problem(Exception):
     """Ends the resolution of one construct. Without a code it has been reported already."""
 
     def __init__(
-        self, code: str = "", span: Span | None = None, message: str = "", hint: str = "", notes: Iterable[Note] = ()
+        self,
+        code: str = "",
+        span: Span | None = None,
+        message: str = "",
+        hint: str = "",
+        notes: Iterable[Note] = (),
     ) -> None:
         super().__init__(message)
         self.code, self.span, self.message, self.hint, self.notes = code, span, message, hint, tuple(notes)
@@ -124,6 +129,28 @@ class Names:
         from .parse import parse
 
         written, span = node.path.value, node.path.span
+        path = self.path_of(node, [other for other, _ in self._open])
+        if path is None:
+            return None
+        if any(_identity(path) == _identity(other) for other in self.files):
+            return None
+        try:
+            source = self.loader(path)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            message = f"can't read '{written}': {reason}"
+            self.diagnostics.add(
+                "include", span, message, f"looked for {path}, relative to the file that includes it"
+            )
+            return None
+        file, found = parse(source)
+        self.diagnostics.items += found.items
+        return file
+
+    def path_of(self, node: syntax.Include, chain: Sequence[Path]) -> Path | None:
+        """The file that ``node`` includes; None, with a message, for one that can't be. ``chain`` are the files
+        that lead here, resolved, the scene's first."""
+        written, span = node.path.value, node.path.span
         if written.lower().endswith(".inc"):
             stem = Path(written).stem.lower()
             stock = vocabulary.STOCK_INCLUDES
@@ -133,22 +160,11 @@ class Names:
             return None
         base = span.source.path
         path = (base.parent if base is not None else Path()) / written
-        if any(_identity(path) == other for other, _ in self._open):
-            chain = " → ".join([*(other.name for other, _ in self._open), path.name])
-            self.diagnostics.add("include", span, f"'{written}' includes itself", f"the chain is {chain}")
+        if _identity(path) in chain:
+            names = " → ".join([*(other.name for other in chain), path.name])
+            self.diagnostics.add("include", span, f"'{written}' includes itself", f"the chain is {names}")
             return None
-        if any(_identity(path) == _identity(other) for other in self.files):
-            return None
-        try:
-            source = self.loader(path)
-        except OSError as error:
-            reason = error.strerror or str(error)
-            message = f"can't read '{written}': {reason}"
-            self.diagnostics.add("include", span, message, f"looked for {path}, relative to the file that includes it")
-            return None
-        file, found = parse(source)
-        self.diagnostics.items += found.items
-        return file
+        return path
 
     def _define(self, node: syntax.Definition) -> None:
         name: syntax.Name = node.name
@@ -156,14 +172,18 @@ class Names:
             return
         if taken := vocabulary.kind_of(name.name):
             hint = "choose another name; the vocabulary's can't be given new meanings"
-            self.diagnostics.add("duplicate-name", name.span, f"'{name.name}' is {ARTICLES[taken]} of plsys", hint)
+            self.diagnostics.add(
+                "duplicate-name", name.span, f"'{name.name}' is {ARTICLES[taken]} of plsys", hint
+            )
             return
         if (first := self.entries.get(name.name)) is not None:
             note = Note(first.definition.span, f"'{name.name}' is first defined here")
             hint = "names of all kinds share one namespace"
-            self.diagnostics.add("duplicate-name", name.span, f"'{name.name}' is defined twice", hint, (note,))
+            self.diagnostics.add(
+                "duplicate-name", name.span, f"'{name.name}' is defined twice", hint, (note,)
+            )
             return
-        self.entries[name.name] = Entry(Definition(name.name, _kind(node), name.span), node)
+        self.entries[name.name] = Entry(Definition(name.name, kind_of_definition(node), name.span), node)
 
     def _assign(self, name: syntax.Name) -> None:
         if not name.name:
@@ -177,7 +197,9 @@ class Names:
             what = f"{ARTICLES[taken]} of plsys" if taken else ARTICLES[entry.kind]
             notes = () if taken else (Note(entry.definition.span, f"'{name.name}' is defined here"),)
             message = f"'{name.name}' is {what} and can't be assigned"
-            self.diagnostics.add("wrong-kind", name.span, message, "choose another name for the parameter", notes)
+            self.diagnostics.add(
+                "wrong-kind", name.span, message, "choose another name for the parameter", notes
+            )
             return
         definition = Definition(name.name, "parameter", name.span, assignments=[name.span])
         self.entries[name.name] = Entry(definition, name)
@@ -203,15 +225,23 @@ class Names:
         """What to say of a name that no definition of the scene has."""
         if taken := vocabulary.kind_of(name.name):
             message = f"'{name.name}' is {ARTICLES[taken]}, not {wanted}"
-            hint = "perhaps a ';' is missing before it" if taken == "operation" else self._suggest(name, kinds)
+            hint = (
+                "perhaps a ';' is missing before it" if taken == "operation" else self._suggest(name, kinds)
+            )
             return Problem("wrong-kind", name.span, message, hint)
         if name.name in vocabulary.UNSUPPORTED:
             return unsupported(name)
         hint = self._suggest(name, kinds) or nearest(name.name, self.entries)
-        return Problem("unknown-name", name.span, f"unknown name '{name.name}': {wanted} is needed here", hint)
+        return Problem(
+            "unknown-name", name.span, f"unknown name '{name.name}': {wanted} is needed here", hint
+        )
 
     def _suggest(self, name: syntax.Name, kinds: tuple[str, ...]) -> str:
-        rows = {"primitive": vocabulary.PRIMITIVES, "function": vocabulary.FUNCTIONS, "constant": vocabulary.CONSTANTS}
+        rows = {
+            "primitive": vocabulary.PRIMITIVES,
+            "function": vocabulary.FUNCTIONS,
+            "constant": vocabulary.CONSTANTS,
+        }
         names = [other for other, entry in self.entries.items() if entry.kind in kinds]
         names += [other for kind in kinds for other in rows.get(kind, ())]
         if "colour" in kinds:
@@ -263,14 +293,17 @@ def _union_terms(union: syntax.Union) -> Iterator[syntax.Term]:
                 yield from _union_terms(item.union)
 
 
-def _kind(node: syntax.Definition) -> str:
+def kind_of_definition(node: syntax.Definition) -> str:
+    """The kind of what ``node``, which has a name, defines: see model.Definition."""
     if isinstance(node, syntax.Declare):
         first = node.items[0] if node.items else None
         if not isinstance(first, syntax.Block):
             return "value"
         if first.name.name == "colour_map":
             return "color_map"
-        return first.name.name if first.name.name in ("texture", "pigment", "finish", "color_map") else "object"
+        return (
+            first.name.name if first.name.name in ("texture", "pigment", "finish", "color_map") else "object"
+        )
     return {
         syntax.ParameterDeclaration: "input",
         syntax.Selection: "selection",
