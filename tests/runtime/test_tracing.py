@@ -1,0 +1,237 @@
+"""Hits through the public binding: what is hit, from which place of the derivation, the same by every accelerator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from assembly import IDENTITY, Assembly
+
+from plsys.compiler import compile, elementary
+from plsys.runtime import PlsysRuntimeError, Scene
+
+ROOT = Path(__file__).resolve().parents[2]
+ACCELERATORS = ("none", "boxes", "bvh")
+
+
+def hits(data: bytes, origins, directions):
+    """The hits, after checking that all accelerators give the same bits."""
+    results = []
+    for accelerator in ACCELERATORS:
+        with Scene(data, accelerator=accelerator) as scene:
+            results.append(scene.intersect(origins, directions))
+    for accelerator, result in zip(ACCELERATORS[1:], results[1:]):
+        for name, ours, expected in zip(result._fields, result, results[0]):
+            np.testing.assert_array_equal(ours, expected, err_msg=f"{accelerator}: {name}")
+    return results[0]
+
+
+def moved(x: float, y: float, z: float) -> tuple:
+    return (1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z)
+
+
+def one_shape(shape: str, *arguments: float, matrix=IDENTITY) -> bytes:
+    a = Assembly()
+    code = a.code("; ".join([f"const {argument}" for argument in arguments] + ["end"])) if arguments else 0
+    a.node("object", name="", ordinal=0, child=1)
+    a.node("transform", name="T", matrix=matrix, child=2)
+    a.node("primitive", shape=shape, code=code)
+    return a.bytes()
+
+
+def chain(depth: float, step: str, counts: str = "load n; const 1; subtract; store n; end") -> bytes:
+    """X: a sphere + [counts] [step] X, while n > 0."""
+    a = Assembly(["n"], file="chain.plsys")
+    init, test = a.code(f"const {depth}; store n; end"), a.code("load n; const 0; greater; end")
+    count, step_code = a.code(counts), a.code(step)
+    a.node("object", name="X", ordinal=0, child=1)
+    a.node("calculate", name="init", code=init, child=2)
+    a.node("enter", symbol=3)
+    a.node("symbol", (3, 1, 3, 2), name="X", live=("n",), draws=0, body=4)
+    a.node("branch", test=test, then=5, otherwise=9)
+    a.node("union", children=(9, 6))
+    a.node("calculate", name="count", code=count, child=7)
+    a.node("transform_code", (4, 5, 4, 9), name="T", code=step_code, child=8)
+    a.node("enter", symbol=3)
+    a.node("primitive", shape="sphere", code=0)
+    return a.bytes()
+
+
+@pytest.mark.parametrize(
+    "shape, arguments, origin, t, normal",
+    [
+        ("sphere", (), (0.6, 0, 5), 4.2, (0.6, 0, 0.8)),
+        ("cylinder", (), (0, 0, 5), 4, (0, 0, 1)),
+        ("cone", (0.5,), (0.75, 0, 5), 4.5, (1 / np.sqrt(1.25), 0, 0.5 / np.sqrt(1.25))),
+        ("box", (), (0.5, 0.5, 5), 4, (0, 0, 1)),
+        ("torus", (0.25,), (1, 0, 5), 4.75, (0, 0, 1)),
+        ("triangle", (), (0.2, 0.3, 5), 5, (0, 0, 1)),
+        ("square", (), (0.9, 0.9, 5), 5, (0, 0, 1)),
+        ("disc", (), (-0.5, 0.5, 5), 5, (0, 0, 1)),
+        ("plane", (), (70, -80, 5), 5, (0, 0, 1)),
+    ],
+)
+def test_each_shape_from_above(shape, arguments, origin, t, normal):
+    result = hits(one_shape(shape, *arguments), origin, (0, 0, -1))
+    np.testing.assert_allclose(result.t, [t], rtol=1e-12)
+    np.testing.assert_allclose(result.normal, [normal], atol=1e-12)
+    assert result.primitive.tolist() == [0] and result.depth.tolist() == [0] and result.symbol.tolist() == [-1]
+
+
+def test_t_counts_directions_and_the_normal_is_mapped_by_the_inverse_transpose():
+    squeezed = (2, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0.5, 3)
+    result = hits(one_shape("sphere", matrix=squeezed), [[1, 0, 9], [0, -5, 3]], [[0, 0, -2], [0, 0.5, 0]])
+    height = 0.5 * np.sqrt(0.75)
+    np.testing.assert_allclose(result.t, [(6 - height) / 2, 8], rtol=1e-14)
+    expected = np.array([1 / 4, 0, height / 0.25])
+    np.testing.assert_allclose(result.normal[0], expected / np.linalg.norm(expected), rtol=1e-12)
+    np.testing.assert_allclose(result.normal[1], [0, -1, 0], atol=1e-15)
+
+
+def test_a_miss_is_infinitely_far_and_nothing():
+    result = hits(one_shape("sphere"), (0, 0, 5), (0, 0, 1))
+    assert result.t[0] == np.inf and result.primitive[0] == result.symbol[0] == result.rule[0] == -1
+    assert not result.normal.any() and np.isnan(result.bound[0])
+
+
+def test_on_equal_t_the_first_in_the_derivation_is_hit():
+    a = Assembly(["n"])
+    deeper = a.code("const 0; store n; end")
+    a.node("object", name="", ordinal=0, child=1)
+    a.node("union", children=(2, 7, 6, 6))
+    a.node("transform", name="away", matrix=moved(50, 0, 0), child=6)
+    a.node("calculate", name="c", code=deeper, child=4)
+    a.node("enter", symbol=5)
+    a.node("symbol", name="S", live=(), draws=0, body=6)
+    a.node("primitive", shape="box", code=0)
+    a.node("union", children=(3, 6))
+    result = hits(a.bytes(), (0.5, 0.5, 5), (0, 0, -1))
+    assert result.primitive.tolist() == [1] and result.depth.tolist() == [1]
+
+
+def test_planes_below_symbols_are_hit_at_any_distance():
+    a = Assembly()
+    tilt = a.code("const 0; const 0; const -3; trans; const 30; rotx; end")
+    a.node("object", name="X", ordinal=0, child=1)
+    a.node("enter", symbol=2)
+    a.node("symbol", name="X", live=(), draws=0, body=3)
+    a.node("union", children=(4, 5, 7))
+    a.node("primitive", shape="sphere", code=0)
+    a.node("transform_code", name="tilt", code=tilt, child=6)
+    a.node("primitive", shape="plane", code=0)
+    a.node("transform", name="T", matrix=moved(9, 0, 0), child=8)
+    a.node("enter", symbol=9)
+    a.node("symbol", name="Y", live=(), draws=0, body=10)
+    a.node("union", children=(6, 11))
+    a.node("primitive", shape="box", code=0)
+    result = hits(a.bytes(), [[0, 0, 9], [1e6, 40, 99], [9.5, 0.5, 9], [20, 0, 5]], [[0, 0, -1]] * 4)
+    assert result.primitive.tolist() == [0, 1, 3, 2]
+    np.testing.assert_allclose(result.t, [8, 102 - 40 * np.tan(np.radians(30)), 8, 5], rtol=1e-9)
+
+
+def test_a_mesh_is_one_primitive_with_smooth_normals_where_given():
+    a = Assembly()
+    corners = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0))
+    tilted = ((0, 0, 1), (1, 0, 1))
+    mesh = a.mesh("m", corners, ((0, 1, 2), (3, 2, 1)), tilted, ((0, 0, 0), (1, 1, 1)))
+    a.node("object", name="", ordinal=0, child=1)
+    a.node("union", children=(2, 3))
+    a.node("mesh", mesh=mesh)
+    a.node("transform", name="T", matrix=moved(5, 0, 0), child=2)
+    result = hits(a.bytes(), [[0.2, 0.2, 1], [0.9, 0.9, 1], [5.5, 0.5, 1], [6.5, 0.5, 1]], [[0, 0, -1]] * 4)
+    assert result.primitive.tolist() == [0, 0, 1, -1]
+    np.testing.assert_allclose(result.normal[0], [0, 0, 1])
+    np.testing.assert_allclose(result.normal[1], np.array([1, 0, 1]) / np.sqrt(2))
+
+
+def test_draws_of_textures_count_for_what_follows():
+    a = Assembly()
+    colour, place = a.code("const 0; rand; texture_set 32; end"), a.code("const 0; rand; const 0; const 0; trans; end")
+    bark = a.record("texture", ((0, 1, 1, 1, 0, 0),))
+    a.node("object", name="S", ordinal=0, child=1)
+    a.node("texture", name="Bark", texture=bark, code=colour, draws=1, child=2)
+    a.node("transform_code", name="T", code=place, child=3)
+    a.node("primitive", shape="sphere", code=0)
+    key = elementary.mix(elementary.mix(elementary.seed_key(0.0), elementary.name_hash("S")), 0)
+    expected = elementary.rand(key, elementary.bits(0.0), 1)
+    with Scene(a.bytes()) as scene:
+        (batch,) = scene.unfold()
+    assert batch.matrix[0, 0, 3] == expected
+    hits(a.bytes(), (expected, 0, 5), (0, 0, -1))
+
+
+@pytest.mark.parametrize("change", [("-= 4.0", "-= 6.0"), ("scale 0.8 0.8 0.8", "scale 0.7 0.7 0.7"), ("scale 0.8 0.8 0.8", "scale 1.1 1.1 1.1")])
+def test_deeper_instances_that_outgrow_the_first_are_not_cut_off(change):
+    text = (ROOT / "scenes" / "tree.plsys").read_text()
+    assert change[0] in text
+    data = compile(text.replace(*change), parameters={"order": 6})
+    random = np.random.default_rng(3)
+    with Scene(data, accelerator="none") as scene:
+        batch = next(iter(scene.unfold()))
+    targets = batch.matrix[random.integers(1, len(batch.matrix), 3000)] @ [0.2, 0.1, 0.7, 1]
+    origins = random.normal(size=(3000, 3)) * 60
+    result = hits(data, origins, targets - origins)
+    assert (result.primitive >= 0).all()
+
+
+def test_a_derivation_100000_levels_deep_is_traced():
+    data = chain(100000, "const 0.001; const 0; const 0; trans; end")
+    result = hits(data, [[200, 0, 0], [-9, 0, 0]], [[-1, 0, 0], [1, 0, 0]])
+    np.testing.assert_allclose(result.t, [99, 8], rtol=1e-9)
+    assert result.primitive.tolist() == [100000, 0] and result.depth.tolist() == [100001, 1]
+
+
+@pytest.mark.parametrize("factor", ["0.3333333333333333", "2"])
+def test_scales_that_leave_the_range_of_numbers_do_no_harm(factor):
+    data = chain(1000, f"const 2; const 0; const 0; trans; const {factor}; scale_uniform; end")
+    result = hits(data, [[2.0, 0, 9], [-5, 0.5, 0.25], [1e200, 3, 4]], [[0, 0, -1], [1, 0, 0], [-1, 0, 0]])
+    assert np.isfinite(result.t[:2]).all()
+
+
+def test_singular_transformations_drop_their_subtree_and_are_counted():
+    data = chain(3, "const 1; const 0; const 1; scale; end")
+    assert hits(data, (0, 0, 9), (0, 0, -1)).primitive.tolist() == [0]
+    with Scene(data) as scene:
+        assert scene.statistics["singular"] == 1 and scene.statistics["primitives"] == 1
+
+
+@pytest.mark.parametrize("accelerator", ["boxes", "bvh"])
+def test_endless_recursion_names_symbol_and_values(accelerator):
+    data = chain(5, "const 1; rotx; end", counts="const 5; store n; end")
+    with pytest.raises(PlsysRuntimeError, match=r"^chain.plsys:3:1: endless recursion: X with n = 5 contains itself$"):
+        Scene(data, accelerator=accelerator)
+
+
+def test_a_recursion_that_goes_on_too_long_reaches_a_named_limit():
+    data = chain(1e9, "const 1; rotx; end")
+    for accelerator in ("boxes", "bvh"):
+        with pytest.raises(PlsysRuntimeError, match="^chain.plsys:3:1: depth: X is still being derived") as caught:
+            Scene(data, accelerator=accelerator)
+        assert caught.value.kind == "limit"
+    with Scene(data, accelerator="none") as scene, pytest.raises(PlsysRuntimeError, match="depth: X"):
+        scene.intersect((0, 0, 9), (0, 0, -1))
+
+
+def test_the_memory_limit_is_named():
+    with pytest.raises(PlsysRuntimeError, match="memory: .* more than the 100000 bytes allowed") as caught:
+        Scene(chain(100000, "const 0.001; const 0; const 0; trans; end"), memory=100000)
+    assert caught.value.kind == "limit"
+
+
+def test_bad_arguments_of_shapes_stand_at_their_place():
+    a = Assembly(file="bad.plsys")
+    radius = a.code("const -0.5; end")
+    a.node("object", name="", ordinal=0, child=1)
+    a.node("primitive", (7, 3, 7, 13), shape="torus", code=radius)
+    for accelerator in ACCELERATORS:
+        with pytest.raises(PlsysRuntimeError, match="^bad.plsys:7:3: the minor radius of a torus must be above 0, not -0.5"):
+            with Scene(a.bytes(), accelerator=accelerator) as scene:
+                scene.intersect((0, 0, 9), (0, 0, -1))
+
+
+def test_equal_subtrees_are_one_state():
+    with Scene(compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 200})) as scene:
+        statistics = scene.statistics
+    assert statistics["states"] == 203 and statistics["primitives"] is None  # about 2^201
+    assert statistics["scene_bytes"] < 1_000_000
