@@ -130,9 +130,9 @@ def _directive_query() -> Query:
 
 def extras(reading: Reading, tree: Tree) -> None:
     """Report what may stand anywhere: a comment that the end of the file cuts off, and unknown directives."""
-    from tree_sitter import Query, QueryCursor
+    from tree_sitter import QueryCursor
 
-    found = QueryCursor(Query(language(), "(directive) @directive")).captures(tree.root_node)
+    found = QueryCursor(_directive_query()).captures(tree.root_node) if b"#" in reading.data else {}
     directives = sorted(found.get("directive", []), key=lambda node: node.start_byte)
     # What follows a directive in its line may be its arguments.
     rows = {reading.span(node).start_position.line: node.end_byte for node in reversed(directives)}
