@@ -22,7 +22,8 @@ EDGE_ANGLE_DEG, EDGE_DEPTH = 10.0, 0.01
 MOST_RETRACED = 2000
 STEP = 1e-6  # of a pixel: how far the neighbours of a ray are that rounding may confuse it with
 
-CLASSES = ("ambiguous", "ours_wrong", "theirs_wrong", "unclassified")
+CLASSES = ("ours_wrong", "theirs_wrong", "ambiguous", "sampling", "unclassified")
+"""``sampling`` is for pictures with several samples a pixel; both pictures here have one, at the same place."""
 
 
 def clipped(color: np.ndarray) -> np.ndarray:

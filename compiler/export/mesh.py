@@ -21,7 +21,7 @@ from ..reading.diagnostics import PlsysError
 from .closed_forms import bounds, volumes
 from .matrices import apply, determinant
 from .meshers import MESHERS, Mesher, segments_for
-from .output import Exported, whole_file
+from .output import Exported, check_size, whole_file
 from .textures import Palette, Texture
 from .unfold import SHAPE_NAMES, Instances, unfold
 
@@ -70,6 +70,7 @@ def export_mesh(graph: Graph, path: str | Path, tolerance: float | None = None, 
     """Writes ``path`` and the .mtl beside it, whole or not at all. ``tolerance`` is in scene units (None: a
     thousandth of the scene's diagonal). Raises PlsysError for a tolerance that isn't positive, a scene without
     anything to tessellate, or more than MOST_TRIANGLES triangles."""
+    check_size(graph)
     result = _measure(graph, limits)
     diagonal = float(np.linalg.norm(result.high - result.low)) if np.isfinite(result.low).all() else 0.0
     if diagonal == 0:

@@ -19,7 +19,7 @@ from ..bytecode.layout_rows import RECORDS
 from ..graph.graph import Graph
 from ..reading.model import Record
 from . import povray_text as text
-from .output import Exported, whole_file
+from .output import Exported, check_size, whole_file
 from .textures import Palette, Texture
 from .unfold import unfold
 
@@ -41,6 +41,7 @@ class _Group:
 def export_povray(graph: Graph, path: str | Path, **limits: int) -> Exported:
     """Writes the scene to ``path``, whole or not at all. ``limits`` are those of :func:`unfold.unfold`. Raises
     PlsysError where the scene can't be unfolded or the file can't be written."""
+    check_size(graph)
     result = Exported()
     with whole_file(path) as file, tempfile.TemporaryFile(dir=Path(path).parent) as spool:
         groups = _spool(graph, spool, result, limits)

@@ -101,6 +101,21 @@ def test_a_scene_that_fails_while_it_is_written_leaves_no_file(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    "rule, message",
+    [
+        ("if (n > 0) S -> [ scale 0.5 ] (sphere + S); else S -> box;", "without end"),
+        ("if (n > -60) S -> [ --n ] (S + S + S); else S -> box;", "a number of 30 digits"),
+        ("if (n > -20) S -> [ --n ] (S + S + S); else S -> box;", "10,460,353,203 primitives"),
+    ],
+)
+def test_scenes_too_large_for_any_file_are_refused_at_once(rule, message, tmp_path):
+    text = f"{HEAD}object {{ S }}\nSelection S {{ C S; {rule} }}\nCalculation C {{ n = 1; }}"
+    with pytest.raises(PlsysError, match=message):
+        export_povray(build(Source.from_text(text)).graph, tmp_path / "scene.pov")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_folder_that_does_not_exist_is_one_clear_error(tmp_path):
     with pytest.raises(PlsysError, match="can't be written"):
         export_povray(build("scenes/tree.plsys").graph, tmp_path / "missing" / "tree.pov")
