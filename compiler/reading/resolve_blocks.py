@@ -89,7 +89,9 @@ class Blocks:
                 word = items.word()
                 if word in TRANSFORMATIONS:
                     span = items.take().span
-                    raise Problem("unsupported", span, "the camera can't be transformed", "set location and look_at")
+                    raise Problem(
+                        "unsupported", span, "the camera can't be transformed", "set location and look_at"
+                    )
                 row = rows.get(items.plain_word())
                 if row is None:
                     raise items.misfit(list(rows))
@@ -97,7 +99,9 @@ class Blocks:
                 if look_at is not None and word in BEFORE_LOOK_AT:
                     message = f"'{word}' after look_at: in POV-Ray this would change the picture"
                     note = Note(look_at, "look_at turns the camera here")
-                    self.names.diagnostics.add("wrong-order", name.span, message, f"write '{word}' before look_at", (note,))
+                    self.names.diagnostics.add(
+                        "wrong-order", name.span, message, f"write '{word}' before look_at", (note,)
+                    )
                 if word == "perspective":
                     continue
                 values[word] = self._property(row, items)
@@ -121,8 +125,13 @@ class Blocks:
             view = affine.difference(values["look_at"], values.get("location", (0.0,) * 3))
             if not any(view):
                 degenerate("the camera looks at its own location", "move location or look_at")
-            elif affine.length(affine.cross(view, values.get("sky", (0.0, 1.0, 0.0)))) <= 1e-12 * affine.length(view):
-                degenerate("the camera looks straight along 'sky'", "set sky to another direction, such as sky <0, 1, 0>")
+            elif affine.length(
+                affine.cross(view, values.get("sky", (0.0, 1.0, 0.0)))
+            ) <= 1e-12 * affine.length(view):
+                degenerate(
+                    "the camera looks straight along 'sky'",
+                    "set sky to another direction, such as sky <0, 1, 0>",
+                )
 
     # --- lights
 
@@ -141,6 +150,8 @@ class Blocks:
             elif row is not None and word != "color":
                 items.take()
                 values[word] = self._property(row, items)
+                if word in ("spotlight", "shadowless"):  # as in POV-Ray, the last of the two counts
+                    values.pop("shadowless" if word == "spotlight" else "spotlight", None)
             elif items.starts_colour():
                 values["color"] = rgb(items, "the light's colour")
             else:
@@ -149,7 +160,12 @@ class Blocks:
         if not aimed:
             values.pop("point_at", None)
         elif values["location"] == values.get("point_at", tuple(row_default(rows["point_at"]))):
-            raise Problem("degenerate", block.name.span, "this light points at its own location", "set point_at elsewhere")
+            raise Problem(
+                "degenerate",
+                block.name.span,
+                "this light points at its own location",
+                "set point_at elsewhere",
+            )
         return Record("light", tuple(values.items()), block.span)
 
 
@@ -164,4 +180,3 @@ def rgb(items: Items, what: str) -> tuple[float, ...]:
     if not all(isinstance(part, Constant) for part in value.parts):
         raise Problem("wrong-kind", value.span, f"{what} must be constant")
     return value.numbers()[:3]
-

@@ -1,6 +1,6 @@
 """The reference model's scenes (tests/povray) in the language of plsys: text → bytecode → picture.
 
-    picture(CASES["finish"], 160, 120)        a (120, 160, 3) float32 array, linear, unclipped
+picture(CASES["finish"], 160, 120)        a (120, 160, 3) float32 array, linear, unclipped
 """
 
 from __future__ import annotations
@@ -8,11 +8,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from povray.model import Scene as Model
-from povray.shapes import Cone, Disc, Mesh, Triangle
-
 from plsys.compiler import compile
 from plsys.runtime import Scene
+from povray.model import Scene as Model
+from povray.shapes import Cone, Disc, Mesh, Triangle
 
 RATIO = "<-image_width/image_height, 0, 0>"
 
@@ -36,7 +35,9 @@ def spelled(model: Model) -> Model:
 
 def text(model: Model, aspect: float) -> str:
     """A plsys scene. Discs lose the 0 that says that they have no hole."""
-    lines = spelled(model).pov().replace("#version 3.7;\n", "").replace(RATIO, f"<-{aspect!r}, 0, 0>").split("\n")
+    lines = (
+        spelled(model).pov().replace("#version 3.7;\n", "").replace(RATIO, f"<-{aspect!r}, 0, 0>").split("\n")
+    )
     return "\n".join(line.replace(", 0.0 ", " ", 1) if line.startswith("disc") else line for line in lines)
 
 

@@ -11,12 +11,14 @@ from dataclasses import replace
 import numpy as np
 import povray.model
 import pytest
+from plsys.compiler import compile
+from plsys.runtime import Scene
 from povray.antialias import adaptive, uniform
 from povray.model import Light
 from povray.shapes import Box, Disc, Plane, Sphere
 from povray.test_shading import CASES, GLASS, MIRROR, SKY, SUN, ball, world
 from povray.textures import Checker, Finish, Gradient, Object, Plain
-from shading_scenes import opened, picture, spelled
+from shading_scenes import opened, picture, spelled, text
 
 WIDTH, HEIGHT = 80, 60
 
@@ -44,9 +46,18 @@ def test_picture_equals_model(name):
 
 def test_first_of_two_equal_keys_has_the_edge():
     """Keys are float32: 0.7 is a little less there, so a plane at exactly 0.7 lies behind the edge, one at 0.3 before."""
-    keys = [(0, (1, 0, 0)), (0.3, (1, 0, 0)), (0.3, (0, 1, 0)), (0.7, (0, 1, 0)), (0.7, (0, 0, 1)), (1, (0, 0, 1))]
+    keys = [
+        (0, (1, 0, 0)),
+        (0.3, (1, 0, 0)),
+        (0.3, (0, 1, 0)),
+        (0.7, (0, 1, 0)),
+        (0.7, (0, 0, 1)),
+        (1, (0, 0, 1)),
+    ]
     for height, colour in ((0.3, (1, 0, 0)), (0.7, (0, 0, 1))):
-        body = Object(Disc((0, 0, height), (0, 0, 1), 4), Gradient((0, 0, 1), keys), Finish((1, 1, 1), diffuse=0.0))
+        body = Object(
+            Disc((0, 0, height), (0, 0, 1), 4), Gradient((0, 0, 1), keys), Finish((1, 1, 1), diffuse=0.0)
+        )
         scene = replace(world(), objects=[body], lights=[], location=(0, 0, 9), look_at=(0, 1, 0), angle=20)
         assert largest_difference(picture(scene, 8, 6), np.broadcast_to(colour, (6, 8, 3))) == 0
 
@@ -103,7 +114,9 @@ def scaled(model, factor: float):
 def test_no_size_is_special(factor):
     glass, mirror = ball(GLASS, MIRROR, x=-1.2), ball(Plain((0.3, 0.6, 0.9)), MIRROR, x=1.2)
     slab = Object(Box((-2, -2, 0.4), (2, -1.9, 0.6)), GLASS)
-    fading = Light((3, -2, 4), (0.3, 0.3, 0.2), "spotlight", point_at=(0, 0, 1), fade_distance=4.0, fade_power=2.0)
+    fading = Light(
+        (3, -2, 4), (0.3, 0.3, 0.2), "spotlight", point_at=(0, 0, 1), fade_distance=4.0, fade_power=2.0
+    )
     model = world(glass, mirror, slab)
     model = replace(model, lights=[SUN, fading])
     with opened(model, WIDTH, HEIGHT) as scene:
@@ -149,3 +162,19 @@ def test_thin_glass_filters_a_shadow_once_for_povray_and_twice_for_us():
     with opened(scene, WIDTH, HEIGHT) as ours:
         difference = np.abs(ours.render(WIDTH, HEIGHT)["color"] - theirs).max(axis=2)
     assert (difference > 0.01).sum() > 100
+
+
+@pytest.mark.parametrize(
+    "words, kind", [("spotlight shadowless", "shadowless"), ("shadowless spotlight", "spotlight")]
+)
+def test_last_of_spotlight_and_shadowless_counts(words, kind):
+    lamp = Light((3, -2, 4), (0.5, 0.5, 0.4), kind, radius=10.0, falloff=15.0)
+    model = replace(world(ball(Plain((0.5, 0.6, 0.8)))), lights=[lamp])
+    line = next(line for line in text(model, 4 / 3).split("\n") if line.startswith("light_source"))
+    both = text(model, 4 / 3).replace(line, line.replace(kind, words, 1))
+    if kind == "shadowless":
+        both = both.replace("shadowless", "radius 10 falloff 15 point_at <0, 0, 1> shadowless", 1)
+    assert both.count("shadowless") == both.count("spotlight") == 1
+    with Scene(compile(both), povray_epsilon=True) as scene:
+        ours = scene.render(WIDTH, HEIGHT)["color"]
+    assert np.array_equal(ours, picture(model, WIDTH, HEIGHT))

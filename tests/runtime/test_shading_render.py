@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plsys.compiler import compile
+from plsys.runtime import PlsysRuntimeError, Scene
 from povray.shapes import Box, Plane
 from povray.test_shading import CASES, GLASS, MIRROR, ball, world
 from povray.textures import Finish, Object, Plain
 from shading_scenes import opened, text
-
-from plsys.compiler import compile
-from plsys.runtime import PlsysRuntimeError, Scene
 
 WIDTH, HEIGHT = 70, 50
 CHANNELS = ("color", "depth", "normal", "position", "primitive", "symbol", "rule", "recursion")
@@ -35,7 +34,9 @@ def test_same_bits_for_any_threads_and_accelerator(options):
     tree = compile(TREE, parameters={"order": 4})
     for data in (compile(text(mixed(), WIDTH / HEIGHT)), tree):
         pictures = [
-            Scene(data, accelerator=accelerator, threads=threads).render(WIDTH, HEIGHT, channels=CHANNELS, **options)
+            Scene(data, accelerator=accelerator, threads=threads).render(
+                WIDTH, HEIGHT, channels=CHANNELS, **options
+            )
             for accelerator, threads in (("bvh", 1), ("bvh", 2), ("bvh", 5), ("boxes", 2), ("none", 1))
         ]
         for other in pictures[1:]:
@@ -94,7 +95,10 @@ def test_statistics_count_rays():
 
 
 def facing_mirrors(reflection: float, **options):
-    walls = [Object(Plane((0, 1, 0), y), Plain((0, 0, 0)), Finish(reflection=(reflection,) * 3)) for y in (3.0, -20.0)]
+    walls = [
+        Object(Plane((0, 1, 0), y), Plain((0, 0, 0)), Finish(reflection=(reflection,) * 3))
+        for y in (3.0, -20.0)
+    ]
     return replace(world(*walls), adc_bailout=0.0, location=(0, 0, 4), look_at=(0, 3, 4), **options)
 
 
@@ -107,7 +111,10 @@ def test_most_trace_levels_end():
 def test_endless_reflections_are_a_limit_with_a_name():
     """Bytecode can ask for more levels than the language allows: each sample's rays are limited, and no stack grows."""
     data = raised_level(compile(text(facing_mirrors(1.0, max_trace_level=250), 4 / 3)))
-    with Scene(data) as scene, pytest.raises(PlsysRuntimeError, match="more than 262144 rays came of one sample"):
+    with (
+        Scene(data) as scene,
+        pytest.raises(PlsysRuntimeError, match="more than 262144 rays came of one sample"),
+    ):
         scene.render(8, 6)
 
 
@@ -124,7 +131,9 @@ def raised_level(data: bytes) -> bytes:
 
 def test_hundreds_of_panes_one_behind_the_other():
     """Transmitted rays cost no level."""
-    panes = [Object(Box((-9, y, -9), (9, y + 0.01, 9)), Plain((1, 1, 1, 0, 1))) for y in np.linspace(1, 20, 300)]
+    panes = [
+        Object(Box((-9, y, -9), (9, y + 0.01, 9)), Plain((1, 1, 1, 0, 1))) for y in np.linspace(1, 20, 300)
+    ]
     model = replace(world(*panes, max_trace_level=1), location=(0, 0, 4), look_at=(0, 3, 4), angle=5.0)
     with opened(model, 4, 3) as scene:
         black = scene.render(4, 3)["color"]
@@ -189,7 +198,10 @@ def test_bad_options_are_refused(options, words):
 
 
 def test_a_scene_without_camera_cannot_be_drawn():
-    with Scene(compile("sphere { <0, 0, 0>, 1 }")) as scene, pytest.raises(PlsysRuntimeError, match="no camera"):
+    with (
+        Scene(compile("sphere { <0, 0, 0>, 1 }")) as scene,
+        pytest.raises(PlsysRuntimeError, match="no camera"),
+    ):
         scene.render(WIDTH, HEIGHT)
 
 
@@ -214,6 +226,7 @@ def test_textures_by_parameter_are_drawn():
 def test_cases_are_drawn_alike_by_povray_tolerance_and_threads():
     model = CASES["filtered shadows"]
     pictures = [
-        opened(model, WIDTH, HEIGHT, povray_epsilon=True, threads=n).render(WIDTH, HEIGHT)["color"] for n in (1, 3)
+        opened(model, WIDTH, HEIGHT, povray_epsilon=True, threads=n).render(WIDTH, HEIGHT)["color"]
+        for n in (1, 3)
     ]
     assert np.array_equal(*pictures)
