@@ -132,7 +132,12 @@ def highlights(table: dict, current: str) -> str:
         for kind in kinds:
             groups = table[kind].values() if kind == "property" else (table[kind],)
             names += [name for group in groups for name in group if name not in names]
-        lines += [f"((name) {capture}", f"  (#any-of? {capture}", *(f'    "{name}"' for name in names), "  ))"]
+        lines += [
+            f"((name) {capture}",
+            f"  (#any-of? {capture}",
+            *(f'    "{name}"' for name in names),
+            "  ))",
+        ]
     lines += ["((name) @constant.builtin", "  (#any-of? @constant.builtin"]
     lines += [*(f'    "{name}"' for name in table["colour"]), "  ))", END]
     return re.sub(f"{re.escape(BEGIN)}.*?{re.escape(END)}", lambda _: "\n".join(lines), current, flags=re.S)

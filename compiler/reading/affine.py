@@ -28,7 +28,9 @@ def compose(outer: Matrix, inner: Matrix) -> Matrix:
     for row in range(3):
         a = outer[4 * row : 4 * row + 4]
         for column in range(4):
-            result.append(sum(a[k] * inner[4 * k + column] for k in range(3)) + (a[3] if column == 3 else 0.0))
+            result.append(
+                sum(a[k] * inner[4 * k + column] for k in range(3)) + (a[3] if column == 3 else 0.0)
+            )
     return tuple(result)
 
 

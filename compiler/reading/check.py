@@ -40,7 +40,24 @@ from .walk import (
 # Angles that people write when they think in radians, and no whole number of degrees.
 RADIANS = [math.pi * factor for factor in (2, 1, 1 / 2, 1 / 3, 1 / 4, 1 / 6, 2 / 3, 3 / 4, 3 / 2)]
 ANGLES = {"rotx": 0, "roty": 0, "rotz": 0, "rot": 0, "sin": 0, "cos": 0, "tan": 0}
-INEXACT = frozenset(("divide", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan2", "exp", "log", "pow", "mix", "rand", "hash"))
+INEXACT = frozenset(
+    (
+        "divide",
+        "sqrt",
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan2",
+        "exp",
+        "log",
+        "pow",
+        "mix",
+        "rand",
+        "hash",
+    )
+)
 
 
 def check(model: Model, diagnostics: Diagnostics) -> None:
@@ -73,7 +90,12 @@ class _Checker:
             hint = f"to place a Selection, write object {{ {names[0]} }}"
             self.diagnostics.add("no-object", start, "the scene has no object", hint)
         elif not self.model.lights:
-            self.diagnostics.add("no-light", start, "the scene has no light", "write light_source { <20, -30, 40> color rgb 1 }")
+            self.diagnostics.add(
+                "no-light",
+                start,
+                "the scene has no light",
+                "write light_source { <20, -30, 40> color rgb 1 }",
+            )
 
     # --- expressions
 
@@ -103,7 +125,9 @@ class _Checker:
         )
         if inexact:
             hint = "numbers are rounded: compare with < or >, or abs(a - b) < 0.001"
-            self.diagnostics.add("float-equality", node.span, "exact comparison of numbers that may be rounded", hint)
+            self.diagnostics.add(
+                "float-equality", node.span, "exact comparison of numbers that may be rounded", hint
+            )
 
     def _angle(self, operation: str, arguments: tuple[Expression, ...]) -> None:
         if operation not in ANGLES:
@@ -114,7 +138,9 @@ class _Checker:
         span = angle.span
         if (named or radians) and span is not None:
             message = f"{operation} takes degrees, and this looks like radians"
-            self.diagnostics.add("radians", span, message, "a full turn is 360; to convert, multiply by 180/pi")
+            self.diagnostics.add(
+                "radians", span, message, "a full turn is 360; to convert, multiply by 180/pi"
+            )
 
     # --- transformations
 
@@ -133,10 +159,18 @@ class _Checker:
         if step.span is None or len(numbers) != len(values):
             return
         if step.operation == "rot" and not any(numbers[1:]):
-            self.diagnostics.add("degenerate", step.span, "the axis of this rotation is zero", "write rot angle x y z, such as rot 30 0 0 1")
+            self.diagnostics.add(
+                "degenerate",
+                step.span,
+                "the axis of this rotation is zero",
+                "write rot angle x y z, such as rot 30 0 0 1",
+            )
         elif step.operation in ("scale", "scale_uniform") and 0.0 in numbers:
             self._singular(step.span)
-        elif step.operation == "matrix" and affine.determinant(affine.of_step(Step("matrix", tuple(values)))) == 0:
+        elif (
+            step.operation == "matrix"
+            and affine.determinant(affine.of_step(Step("matrix", tuple(values)))) == 0
+        ):
             self._singular(step.span)
         elif step.operation == "shear":
             xy, xz, yx, yz, zx, zy = numbers
@@ -145,7 +179,12 @@ class _Checker:
 
     def _singular(self, span: Span) -> None:
         message = "this transformation flattens what it acts on: its subtree is dropped"
-        self.diagnostics.add("singular", span, message, "for something thin, scale by a small number; flat shapes are triangle, square and disc")
+        self.diagnostics.add(
+            "singular",
+            span,
+            message,
+            "for something thin, scale by a small number; flat shapes are triangle, square and disc",
+        )
 
     # --- guards and weights
 
@@ -173,7 +212,9 @@ class _Checker:
 
     def _no_rule(self, symbol: Symbol, ways_: list[Way]) -> None:
         if not any(way.is_rule and is_open(way, self.seed) for way in ways_):
-            self.diagnostics.add("no-rule", symbol.name_span, f"no rule of '{symbol.name}' can apply: it produces nothing")
+            self.diagnostics.add(
+                "no-rule", symbol.name_span, f"no rule of '{symbol.name}' can apply: it produces nothing"
+            )
 
     # --- names
 
@@ -191,7 +232,9 @@ class _Checker:
             elif definition.kind == "selection":
                 if self.model.objects and name not in self.reached and name in self.model.symbols:
                     message = f"no object leads to the Selection '{name}'"
-                    self.diagnostics.add("unreachable", definition.span, message, f"to place it, write object {{ {name} }}")
+                    self.diagnostics.add(
+                        "unreachable", definition.span, message, f"to place it, write object {{ {name} }}"
+                    )
             elif not definition.references:
                 self.diagnostics.add("unused", definition.span, f"'{name}' is {what} that nothing uses")
 
@@ -212,7 +255,11 @@ class _Checker:
                 for expression in expressions_of(operator):
                     read |= reads(expression)
         for way in all_ways(self.model):
-            for expression in (*(test for test, _ in way.guards), *way.weights, *getattr(way.leaf, "arguments", ())):
+            for expression in (
+                *(test for test, _ in way.guards),
+                *way.weights,
+                *getattr(way.leaf, "arguments", ()),
+            ):
                 read |= reads(expression)
         return read | (set(self.model.parameters) - assigned)
 

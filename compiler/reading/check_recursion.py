@@ -11,7 +11,19 @@ at once or never.
 from __future__ import annotations
 
 from .diagnostics import Diagnostics
-from .model import Assign, Branch, Calculate, Choose, Constant, Enter, Model, Operand, Produce, Production, Symbol
+from .model import (
+    Assign,
+    Branch,
+    Calculate,
+    Choose,
+    Constant,
+    Enter,
+    Model,
+    Operand,
+    Produce,
+    Production,
+    Symbol,
+)
 from .walk import Way, decided, draws, is_open, leaves, reached_symbols, reads, seed_of, ways
 
 # An endless recursion is legal iff every way round it contracts, because then a detail cut-off ends it. No back end
@@ -83,34 +95,53 @@ def _ends(production: Production, ending: set[str], seed: float) -> bool:
     return all(leaf.symbol in ending for _, leaf in leaves(body) if isinstance(leaf, Enter))
 
 
-def _check_cycle(members: list[Symbol], component: frozenset[str], seed: float, diagnostics: Diagnostics) -> None:
+def _check_cycle(
+    members: list[Symbol], component: frozenset[str], seed: float, diagnostics: Diagnostics
+) -> None:
     """A cycle that can be left: does something change on the way round that its guards look at?"""
     back: list[tuple[Symbol, Way]] = []
     for symbol in members:
         for way in ways(symbol.production):
             if isinstance(way.leaf, Enter) and way.leaf.symbol in component and is_open(way, seed):
                 back.append((symbol, way))
-    drawing = [(symbol, way) for symbol, way in back if way.weights or any(draws(test) for test, _ in way.guards)]
-    guards = {name for symbol in members for way in ways(symbol.production) for test, _ in way.guards for name in reads(test)}
+    drawing = [
+        (symbol, way) for symbol, way in back if way.weights or any(draws(test) for test, _ in way.guards)
+    ]
+    guards = {
+        name
+        for symbol in members
+        for way in ways(symbol.production)
+        for test, _ in way.guards
+        for name in reads(test)
+    }
     changed = {name for _, way in back for name in _assigned(way)}
     if drawing and not guards & changed:
         symbol, way = drawing[0]
         span = way.leaf.span or symbol.name_span
         message = f"this recursion of '{symbol.name}' ends with some probability only"
-        diagnostics.add("random-loop", span, message, "the number of its rounds has no limit; a counter would give one")
+        diagnostics.add(
+            "random-loop", span, message, "the number of its rounds has no limit; a counter would give one"
+        )
         return
     for symbol, way in back:
         if len(members) == 1 and not way.operators and not _draws_before(way):
             span = way.leaf.span or symbol.name_span
             message = f"'{symbol.name}' leads back to itself with nothing changed: this never ends"
-            diagnostics.add("identity-cycle", span, message, f"put an operator before it: [ --n; trans 0 0 1 ] {symbol.name}")
+            diagnostics.add(
+                "identity-cycle",
+                span,
+                message,
+                f"put an operator before it: [ --n; trans 0 0 1 ] {symbol.name}",
+            )
             return
     if guards and not guards & changed and not drawing:
         symbol, way = back[0]
         span = way.leaf.span or symbol.name_span
         named = ", ".join(f"'{name}'" for name in sorted(guards))
         message = f"the guards read {named}, which this recursion of '{symbol.name}' never changes"
-        diagnostics.add("counter", span, message, f"change it on the way: [ --{sorted(guards)[0]} ] {symbol.name}")
+        diagnostics.add(
+            "counter", span, message, f"change it on the way: [ --{sorted(guards)[0]} ] {symbol.name}"
+        )
 
 
 def _draws_before(way: Way) -> bool:

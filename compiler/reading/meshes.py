@@ -67,11 +67,15 @@ def _groups(path: Path, data: bytes) -> list[tuple]:
             if part.get("faces") is None or len(part["faces"]) == 0:
                 continue
             vertices = numpy.array(part["vertices"], dtype=numpy.float64).reshape(-1, 3)
-            faces = numpy.array(trimesh.geometry.triangulate_quads(part["faces"]), dtype=numpy.int64).reshape(-1, 3)
+            faces = numpy.array(trimesh.geometry.triangulate_quads(part["faces"]), dtype=numpy.int64).reshape(
+                -1, 3
+            )
             normals = part.get("vertex_normals")
             if normals is not None and len(normals) != len(vertices):
                 normals = None
-            groups.append((vertices, faces, None if normals is None else numpy.array(normals, dtype=numpy.float64)))
+            groups.append(
+                (vertices, faces, None if normals is None else numpy.array(normals, dtype=numpy.float64))
+            )
     except Exception as error:  # the loaders raise whatever they run into in a broken file
         raise MeshError(f"it isn't a mesh that can be read ({type(error).__name__}: {error})") from None
     if not groups:

@@ -27,6 +27,7 @@ from .resolve_names import ARTICLES, OBJECT_BLOCKS, Entry, Names, Problem
 from .resolve_objects import Objects, split
 from .resolve_operators import Operators
 from .resolve_rules import Rules
+from .resolve_terms import Terms
 from .resolve_textures import Textures
 from .source import Source, Span
 from .vocabulary import BLOCKS as BLOCK_ROWS
@@ -68,8 +69,9 @@ class _Resolver:
         self.expressions = Expressions(self.names, self.constant_of, self.seed_of)
         self.textures = Textures(self.names, self.expressions)
         self.operators = Operators(self.names, self.expressions)
-        self.rules = Rules(self.names, self.expressions, self.operators, self.textures, self.load_mesh)
-        self.objects = Objects(self.names, self.expressions, self.textures, self.rules, self.add_mesh)
+        self.terms = Terms(self.names, self.expressions, self.operators, self.textures, self.load_mesh)
+        self.rules = Rules(self.names, self.expressions, self.terms)
+        self.objects = Objects(self.names, self.expressions, self.textures, self.terms, self.add_mesh)
         self.blocks = Blocks(self.names, self.expressions, self.textures)
         self.settings: Values = {}
         self.mesh_files: dict[Path, int] = {}
@@ -85,24 +87,17 @@ class _Resolver:
         # In the text's order, so that long chains of constants need no deep recursion.
         for entry in list(entries.values()):
             if entry.kind == "value":
-                self.reporting(lambda: self.constant_of(entry, entry.definition.span))
+                self.names.reporting(lambda: self.constant_of(entry, entry.definition.span), None)
         for entry in list(entries.values()):
             if isinstance(entry.node, syntax.Selection):
                 model.symbols[entry.definition.name] = self.rules.selection(entry.node)
         for block in self.names.blocks:
-            self.reporting(lambda: self.block(block))
+            self.names.reporting(lambda: self.block(block), None)
         for entry in list(entries.values()):
-            self.reporting(lambda: self.force(entry))
+            self.names.reporting(lambda: self.force(entry), None)
         if self.settings:
             model.settings = Record("settings", tuple(self.settings.items()))
         return model
-
-    def reporting(self, work: Callable[[], object]) -> None:
-        """Do ``work`` and report its Problem, if any."""
-        try:
-            work()
-        except Problem as problem:
-            problem.report(self.diagnostics)
 
     # --- settings and the seed
 
@@ -110,7 +105,7 @@ class _Resolver:
         """Settings come first: the seed is part of every ``hash``."""
         for block in self.names.blocks:
             if block.name.name == "global_settings":
-                self.reporting(lambda: self.blocks.global_settings(block, self.settings))
+                self.names.reporting(lambda: self.blocks.global_settings(block, self.settings), None)
         if self.seed is None:
             self.seed = self.settings.get("seed", (0.0,))[0]
         else:
@@ -118,7 +113,9 @@ class _Resolver:
 
     def seed_of(self, span: Span) -> float:
         if self.seed is None:
-            raise Problem("wrong-value", span, "hash needs the scene's seed, which global_settings is only just setting")
+            raise Problem(
+                "wrong-value", span, "hash needs the scene's seed, which global_settings is only just setting"
+            )
         return self.seed
 
     # --- constants
@@ -151,7 +148,9 @@ class _Resolver:
         colour = plain and items.starts_colour()
         value = items.colour() if colour else items.value("a value")
         if items:
-            raise Problem("wrong-value", items.peek().span, f"#declare {node.name.name} has more than one value")
+            raise Problem(
+                "wrong-value", items.peek().span, f"#declare {node.name.name} has more than one value"
+            )
         return value
 
     # --- inputs
@@ -161,25 +160,38 @@ class _Resolver:
         for name in self.parameters:
             if name not in inputs:
                 entry = self.names.entries.get(name)
-                what = f"'{name}' is {ARTICLES[entry.kind]}" if entry else f"the scene has no Parameter '{name}'"
-                hint = nearest(name, inputs) or (f"it has: {' '.join(inputs)}" if inputs else "it declares none")
+                what = (
+                    f"'{name}' is {ARTICLES[entry.kind]}" if entry else f"the scene has no Parameter '{name}'"
+                )
+                hint = nearest(name, inputs) or (
+                    f"it has: {' '.join(inputs)}" if inputs else "it declares none"
+                )
                 span = Span(self.file.span.source, 0, 0)
-                self.diagnostics.add("unknown-name", span, f"{what}, which -D can't set" if entry else what, hint)
+                self.diagnostics.add(
+                    "unknown-name", span, f"{what}, which -D can't set" if entry else what, hint
+                )
         for entry in inputs.values():
-            self.reporting(lambda: self.constant_of(entry, entry.definition.span))
+            self.names.reporting(lambda: self.constant_of(entry, entry.definition.span), None)
 
     def _input(self, node: syntax.ParameterDeclaration) -> Value:
         name = node.name.name
         default = self.expressions.constant(node.value, INPUTS)
-        low, high = (None if bound is None else self.expressions.constant(bound, INPUTS) for bound in (node.low, node.high))
+        low, high = (
+            None if bound is None else self.expressions.constant(bound, INPUTS)
+            for bound in (node.low, node.high)
+        )
         if low is not None and high is not None and low > high:
             message = f"the range of '{name}' is empty: {low:g} is above {high:g}"
-            raise Problem("wrong-value", node.low.span.to(node.high.span), message, f"write [{high:g} to {low:g}]")
+            raise Problem(
+                "wrong-value", node.low.span.to(node.high.span), message, f"write [{high:g} to {low:g}]"
+            )
         value = float(self.parameters.get(name, default))
         for number, what, span in ((default, "default", node.value.span), (value, "value", node.name.span)):
             outside = (low is not None and number < low) or (high is not None and number > high)
             if outside or not math.isfinite(number):
-                allowed = f"from {low:g} to {high:g}" if low is not None and high is not None else "a finite number"
+                allowed = (
+                    f"from {low:g} to {high:g}" if low is not None and high is not None else "a finite number"
+                )
                 message = f"the {what} of '{name}' is {number:g}, but must be {allowed}"
                 raise Problem("wrong-value", span, message)
         text = node.text.value if node.text is not None else ""
@@ -208,7 +220,9 @@ class _Resolver:
     def once(self, block: syntax.Block, again: bool) -> None:
         if again:
             message = f"a second {block.name.name} block"
-            self.diagnostics.add("duplicate-name", block.name.span, message, "a scene has one; remove the other")
+            self.diagnostics.add(
+                "duplicate-name", block.name.span, message, "a scene has one; remove the other"
+            )
 
     def place(self, block: syntax.Block) -> None:
         for symbol, operand in split(self.objects.object(block)):
@@ -221,11 +235,18 @@ class _Resolver:
             hint = f"write it into an object, or #declare Name = {name} {{ … }}"
             return Problem("wrong-kind", block.name.span, f"'{name}' stands outside of an object", hint)
         if name in PRIMITIVES:
-            return Problem("wrong-kind", block.name.span, f"the primitive '{name}' is no scene block", "it stands in rules")
+            return Problem(
+                "wrong-kind",
+                block.name.span,
+                f"the primitive '{name}' is no scene block",
+                "it stands in rules",
+            )
         if name in self.names.entries:
             kind = self.names.entries[name].kind
             hint = f"to place it, write object {{ {name} }}" if kind in ("selection", "object") else ""
-            return Problem("wrong-kind", block.name.span, f"'{name}' is {ARTICLES[kind]}, not a scene block", hint)
+            return Problem(
+                "wrong-kind", block.name.span, f"'{name}' is {ARTICLES[kind]}, not a scene block", hint
+            )
         problem = self.names.unknown(block.name, (), "a scene block")
         if problem.code == "unknown-name":
             problem.hint = nearest(name, BLOCK_ROWS)
@@ -245,7 +266,7 @@ class _Resolver:
         elif entry.kind == "value" and not entry.failed:
             self.constant_of(entry, entry.definition.span)
         elif isinstance(node, syntax.Selection):
-            self.rules.entry_action(node)
+            self.terms.entry_action(node)
 
     # --- meshes
 
@@ -256,7 +277,9 @@ class _Resolver:
     def load_mesh(self, call: syntax.Call) -> int:
         """The index of the mesh that ``mesh("leaf.obj")`` names, loaded once. Raises Problem."""
         if len(call.arguments) != 1 or not isinstance(call.arguments[0], syntax.String):
-            raise Problem("wrong-arguments", call.span, "mesh takes the name of a file", 'write mesh("leaf.obj")')
+            raise Problem(
+                "wrong-arguments", call.span, "mesh takes the name of a file", 'write mesh("leaf.obj")'
+            )
         text = call.arguments[0]
         base = text.span.source.path
         path = (base.parent if base is not None else Path()) / text.value
@@ -265,5 +288,7 @@ class _Resolver:
                 self.mesh_files[path] = self.add_mesh(meshes.load(path))
             except meshes.MeshError as error:
                 message = f"can't use the mesh '{text.value}': {error}"
-                raise Problem("file", text.span, message, f"looked for {path}, relative to the scene file") from None
+                raise Problem(
+                    "file", text.span, message, f"looked for {path}, relative to the scene file"
+                ) from None
         return self.mesh_files[path]

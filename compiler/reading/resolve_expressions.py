@@ -68,7 +68,9 @@ class Expressions:
     """``constant_of`` gives the value of a declared constant or an input; ``seed`` is asked for when a constant
     needs the scene's seed, and may raise Problem."""
 
-    def __init__(self, names: Names, constant_of: Callable[[Entry, Span], Value], seed: Callable[[Span], float]) -> None:
+    def __init__(
+        self, names: Names, constant_of: Callable[[Entry, Span], Value], seed: Callable[[Span], float]
+    ) -> None:
         self.names, self.constant_of, self.seed = names, constant_of, seed
 
     # --- what other modules ask for
@@ -135,7 +137,9 @@ class Expressions:
             entry = self.names.find(node, kinds, "a value" if scope.block else "a number")
         except Problem as problem:
             if problem.code == "unknown-name" and scope.reads and not problem.hint:
-                problem.hint = f"nothing assigns it: write Calculation C {{ {name} = 1; }}, or Parameter {name} = 1;"
+                problem.hint = (
+                    f"nothing assigns it: write Calculation C {{ {name} = 1; }}, or Parameter {name} = 1;"
+                )
             raise
         if entry.kind != "parameter":
             value = self.constant_of(entry, span)
@@ -157,7 +161,9 @@ class Expressions:
             raise Problem("wrong-arguments", node.span, message, f"write {row.signature}")
         if row.name == "rand" and not scope.draws:
             hint = "use hash(...), or draw in a Calculation"
-            raise Problem("wrong-kind", node.span, f"there is nothing to draw random numbers for in {scope.place}", hint)
+            raise Problem(
+                "wrong-kind", node.span, f"there is nothing to draw random numbers for in {scope.place}", hint
+            )
         arguments = tuple(self.number(argument, scope) for argument in node.arguments)
         if row.name in ("min", "max"):
             result = arguments[0]
@@ -183,7 +189,9 @@ class Expressions:
         # A signed number is one constant, so that `-0.5` reads back as it was written.
         if operation == "negate" and isinstance(node.operand, syntax.Number):
             return Value("number", (Constant(-node.operand.value, node.span),), node.span)
-        return Value(operand.kind, tuple(Apply(operation, (part,), node.span) for part in operand.parts), node.span)
+        return Value(
+            operand.kind, tuple(Apply(operation, (part,), node.span) for part in operand.parts), node.span
+        )
 
     def _binary(self, node: syntax.Binary, scope: Scope) -> Value:
         left, right = self._value(node.left, scope), self._value(node.right, scope)
@@ -205,7 +213,9 @@ class Expressions:
         test = self.number(node.test, scope)
         then, otherwise = self._value(node.then, scope), self._value(node.otherwise, scope)
         if then.kind != otherwise.kind or len(then.parts) != len(otherwise.parts):
-            message = f"both results of '?:' must be alike, these are {then.described} and {otherwise.described}"
+            message = (
+                f"both results of '?:' must be alike, these are {then.described} and {otherwise.described}"
+            )
             raise Problem("wrong-value", node.span, message)
         pairs = zip(then.parts, otherwise.parts)
         return Value(then.kind, tuple(Apply("select", (test, *pair), node.span) for pair in pairs), node.span)
@@ -217,4 +227,6 @@ def _spread(value: Value, size: int) -> Sequence[Expression]:
 
 
 def _has_hash(parts: Sequence[Expression]) -> bool:
-    return any(isinstance(part, Apply) and (part.operation == "hash" or _has_hash(part.arguments)) for part in parts)
+    return any(
+        isinstance(part, Apply) and (part.operation == "hash" or _has_hash(part.arguments)) for part in parts
+    )

@@ -97,7 +97,9 @@ class Items:
         if value.kind == "number":
             value = Value("vector", value.parts * size, value.span)
         if len(value.parts) != size or value.kind != "vector":
-            raise Problem("wrong-value", value.span, f"{needed} must be a vector of {size}, this is {value.described}")
+            raise Problem(
+                "wrong-value", value.span, f"{needed} must be a vector of {size}, this is {value.described}"
+            )
         if not all(isinstance(part, Constant) for part in value.parts):
             raise Problem("wrong-kind", value.span, f"{needed} must be constant")
         return value.numbers()
@@ -166,7 +168,9 @@ class Items:
 
     def _look_for_bytes(self, parts: Sequence[Expression], span: Span) -> None:
         shown = [part.value for part in parts[:3] if isinstance(part, Constant)]
-        if any(value > 20 for value in shown) and all(value == int(value) and 0 <= value <= 255 for value in shown):
+        if any(value > 20 for value in shown) and all(
+            value == int(value) and 0 <= value <= 255 for value in shown
+        ):
             hint = f"perhaps rgb <{', '.join(f'{value:g}/255' for value in shown)}>"
             self.diagnostics.add("colour-range", span, "a colour's components are from 0 to 1", hint)
 
@@ -192,7 +196,11 @@ class Items:
         hint = nearest(name.name, rows)
         if not hint and rows:
             hint = f"it has: {' '.join(rows)}"
-        code = "wrong-kind" if vocabulary.kind_of(name.name) or name.name in self.expressions.names.entries else "unknown-name"
+        code = (
+            "wrong-kind"
+            if vocabulary.kind_of(name.name) or name.name in self.expressions.names.entries
+            else "unknown-name"
+        )
         return Problem(code, name.span, message, hint)
 
 

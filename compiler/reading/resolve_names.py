@@ -14,12 +14,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Callable, Iterable, Iterator, Sequence
+from typing import Callable, Iterable, Iterator, Sequence, TypeVar
 
 from . import syntax, vocabulary
 from .diagnostics import Diagnostics, Note, nearest
 from .model import Definition
 from .source import Source, Span
+
+T = TypeVar("T")
 
 ARTICLES = {
     "selection": "a Selection",
@@ -156,7 +158,9 @@ class Names:
             stock = vocabulary.STOCK_INCLUDES
             known = stem in stock["names"]
             message = f"'{written}' is {'one of POV-Ray' + chr(39) + 's stock files' if known else 'a POV-Ray file'}, which plsys doesn't read"
-            self.diagnostics.add("include", span, message, str(stock["colors" if stem == "colors" else "default"]))
+            self.diagnostics.add(
+                "include", span, message, str(stock["colors" if stem == "colors" else "default"])
+            )
             return None
         base = span.source.path
         path = (base.parent if base is not None else Path()) / written
@@ -203,6 +207,14 @@ class Names:
             return
         definition = Definition(name.name, "parameter", name.span, assignments=[name.span])
         self.entries[name.name] = Entry(definition, name)
+
+    def reporting(self, read: Callable[[], T], fallback: T) -> T:
+        """What ``read`` gives; where it raises a Problem, that is reported and ``fallback`` stands in."""
+        try:
+            return read()
+        except Problem as problem:
+            problem.report(self.diagnostics)
+            return fallback
 
     # --- looking up
 

@@ -18,12 +18,11 @@ from .model import Enter, Mesh, MeshLeaf, NoShadow, Operand, Operator, Paint, Pr
 from .resolve_expressions import ARGUMENTS, BLOCKS, Expressions
 from .resolve_items import Items
 from .resolve_names import OBJECT_BLOCKS, Entry, Names, Problem
-from .resolve_rules import Rules
 from .resolve_shapes import corners, shape
+from .resolve_terms import Terms
 from .resolve_textures import TRANSFORMATIONS, Look, Textures
 from .vocabulary import BLOCKS as BLOCK_ROWS
 from .vocabulary import MODIFIERS
-
 
 # Declared objects in declared objects double quickly; a million parts is more than a text should hold.
 MAX_PARTS = 1_000_000
@@ -64,11 +63,11 @@ class Objects:
         names: Names,
         expressions: Expressions,
         textures: Textures,
-        rules: Rules,
+        terms: Terms,
         add_mesh: Callable[[Mesh], int],
     ) -> None:
         self.names, self.expressions, self.textures = names, expressions, textures
-        self.rules, self.add_mesh = rules, add_mesh
+        self.terms, self.add_mesh = terms, add_mesh
         self._sizes: dict[int, tuple[int, Operand]] = {}
 
     def object(self, block: syntax.Block) -> Operand:
@@ -85,13 +84,17 @@ class Objects:
         elif name == "mesh":
             placed = Placed(self._mesh(items), compound=False)
         elif name == "smooth_triangle":
-            placed = Placed(MeshLeaf(self.add_mesh(build("", [corners(items, smooth=True)])), block.span), compound=False)
+            placed = Placed(
+                MeshLeaf(self.add_mesh(build("", [corners(items, smooth=True)])), block.span), compound=False
+            )
         else:
             placed = Placed(shape(items, name), compound=False)
         self.modify(placed, items)
         if self._size(placed.operand) > MAX_PARTS:
             message = f"this object has more than {MAX_PARTS:,} parts"
-            raise Problem("limit", block.name.span, message, "let a Selection make what repeats: it is never copied")
+            raise Problem(
+                "limit", block.name.span, message, "let a Selection make what repeats: it is never copied"
+            )
         return placed
 
     def _size(self, operand: Operand) -> int:
@@ -101,7 +104,10 @@ class Objects:
         if not isinstance(operand, Sum):
             return 1
         if id(operand) not in self._sizes:
-            self._sizes[id(operand)] = (sum(map(self._size, operand.terms)), operand)  # kept: its id stays its own
+            self._sizes[id(operand)] = (
+                sum(map(self._size, operand.terms)),
+                operand,
+            )  # kept: its id stays its own
         return self._sizes[id(operand)][0]
 
     # --- what is placed
@@ -109,7 +115,12 @@ class Objects:
     def _object(self, items: Items) -> Placed:
         item = items.peek()
         if item is None:
-            raise Problem("wrong-arguments", items.span, "this object is empty", "write object { Name } with a Selection's name")
+            raise Problem(
+                "wrong-arguments",
+                items.span,
+                "this object is empty",
+                "write object { Name } with a Selection's name",
+            )
         items.take()
         if isinstance(item, syntax.Block) and item.name.name in OBJECT_BLOCKS:
             return self._nested(item)
@@ -118,14 +129,16 @@ class Objects:
             items.at -= 1
             raise items.misfit(())
         if name.name == "mesh" and isinstance(item, syntax.Call):
-            return Placed(self.rules.operand(item, "", ARGUMENTS), compound=False)
+            return Placed(self.terms.operand(item, "", ARGUMENTS), compound=False)
         entry = self.names.find(name, ("selection", "object"), "a Selection or a declared object")
         if entry.kind == "object":
             if isinstance(item, syntax.Call):
-                raise Problem("wrong-arguments", item.span, f"'{name.name}' is a declared object and takes no arguments")
+                raise Problem(
+                    "wrong-arguments", item.span, f"'{name.name}' is a declared object and takes no arguments"
+                )
             return self._declared(entry, name)
         arguments = item.arguments if isinstance(item, syntax.Call) else ()
-        return Placed(self.rules.enter(entry, item.span, arguments, "", ARGUMENTS), compound=True)
+        return Placed(self.terms.enter(entry, item.span, arguments, "", ARGUMENTS), compound=True)
 
     def _nested(self, block: syntax.Block) -> Placed:
         """What ``object { sphere { … } … }`` holds; its own texture stays under the outer modifiers' control."""
@@ -167,7 +180,9 @@ class Objects:
             hint = "texture, pigment, finish, color_map and objects can be declared"
             raise Problem("unsupported", block.name.span, f"a {row.name} can't be declared", hint)
         if len(node.items) > 1:
-            raise Problem("wrong-value", node.items[1].span, f"#declare {node.name.name} has more than one value")
+            raise Problem(
+                "wrong-value", node.items[1].span, f"#declare {node.name.name} has more than one value"
+            )
         return self.placed(block)
 
     def _union(self, items: Items) -> Placed:
@@ -180,7 +195,9 @@ class Objects:
                 raise items.misfit(OBJECT_BLOCKS)
             parts.append(self.object(block))
         if not parts:
-            raise Problem("wrong-arguments", items.span, "this union is empty", "write objects into it: sphere { … }")
+            raise Problem(
+                "wrong-arguments", items.span, "this union is empty", "write objects into it: sphere { … }"
+            )
         return Placed(parts[0] if len(parts) == 1 else Sum(tuple(parts), items.span), compound=True)
 
     def _mesh(self, items: Items) -> Operand:
@@ -192,10 +209,17 @@ class Objects:
             triangles.append(corners(inner, block.name.name == "smooth_triangle"))
             if inner:
                 if inner.word() == "texture":
-                    raise Problem("unsupported", inner.peek().span, "a texture a triangle isn't supported", "put it on the mesh")
+                    raise Problem(
+                        "unsupported",
+                        inner.peek().span,
+                        "a texture a triangle isn't supported",
+                        "put it on the mesh",
+                    )
                 raise inner.misfit(())
         if not triangles:
-            raise Problem("wrong-arguments", items.span, "this mesh is empty", "write triangle { a, b, c } into it")
+            raise Problem(
+                "wrong-arguments", items.span, "this mesh is empty", "write triangle { a, b, c } into it"
+            )
         return MeshLeaf(self.add_mesh(build("", triangles)), items.span)
 
     # --- modifiers
@@ -229,7 +253,9 @@ class Objects:
             pigment = self.textures.pigment(block, BLOCKS, look.pigment if placed.look else None)
             placed.put_texture(Look(pigment, look.finish), move=True)
         else:
-            placed.put_texture(Look(look.pigment, self.textures.finish(block, BLOCKS, look.finish)), move=False)
+            placed.put_texture(
+                Look(look.pigment, self.textures.finish(block, BLOCKS, look.finish)), move=False
+            )
 
 
 def split(operand: Operand) -> list[tuple[str, Operand]]:

@@ -15,7 +15,13 @@ from .resolve_names import ARTICLES, Entry, Names, Problem
 UPDATES = {"+=": "add", "-=": "subtract", "*=": "multiply", "/=": "divide", "++": "add", "--": "subtract"}
 
 # What POV-Ray calls the operations, for the hint.
-POV_NAMES = {"translate": "trans", "rotate": "rotx, roty and rotz", "move": "trans", "turn": "rotz", "rotate_z": "rotz"}
+POV_NAMES = {
+    "translate": "trans",
+    "rotate": "rotx, roty and rotz",
+    "move": "trans",
+    "turn": "rotz",
+    "rotate_z": "rotz",
+}
 
 
 class Operators:
@@ -76,7 +82,9 @@ class Operators:
         for argument in node.arguments:
             if isinstance(argument, syntax.Vector):
                 hint = f"{row.name}'s numbers stand side by side: {row.signature}"
-                raise Problem("wrong-arguments", argument.span, f"{row.name} takes numbers, not a vector", hint)
+                raise Problem(
+                    "wrong-arguments", argument.span, f"{row.name} takes numbers, not a vector", hint
+                )
             arguments.append(self.expressions.number(argument, RULES))
         self._count(row, node)
         uniform = row.name == "scale" and len(arguments) == 1
@@ -125,7 +133,9 @@ class Operators:
     def _unknown(self, name: syntax.Name) -> Problem:
         if name.name in POV_NAMES:
             hint = f"in a Transformation it is {POV_NAMES[name.name]}, with the numbers side by side"
-            return Problem("unknown-name", name.span, f"'{name.name}' is POV-Ray's modifier of scene objects", hint)
+            return Problem(
+                "unknown-name", name.span, f"'{name.name}' is POV-Ray's modifier of scene objects", hint
+            )
         if (entry := self.names.entries.get(name.name)) is not None:
             message = f"'{name.name}' is {ARTICLES[entry.kind]}, not an operation"
             hint = f"to assign it, write {name.name} = …" if entry.kind == "parameter" else ""

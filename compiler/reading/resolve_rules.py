@@ -1,67 +1,38 @@
-"""Selections: rules → productions, and the rules about entry actions.
+"""Selections: rules → productions.
 
-A reference to X in a production of Y runs X's entry action iff Y can't be reached from X; ``object`` always runs
-it. Reachability is static: it follows every reference, whatever its guard.
-
-Example: with ``C_init Tree;`` as its entry action, ``object { Tree }`` is
-``Prefixed(Calculate('C_init', …), Enter('Tree'))`` and the ``Tree`` in Tree's own rules is ``Enter('Tree')``.
+Example: ``if (n > 1) A -> box; A -> 3: disc | 1: ;`` is
+``Branch(n > 1, Produce(0, box), Choose((3, Produce(1, disc)), (1, Produce(2, Empty))))``.
 """
 
 from __future__ import annotations
 
-from typing import Callable
-
-from . import syntax, vocabulary
+from . import syntax
 from .diagnostics import Note
 from .evaluate import NotFinite, fold
 from .model import (
     Apply,
-    Assign,
     Branch,
-    Calculate,
     Choose,
     Constant,
     Empty,
-    Enter,
-    MeshLeaf,
     Operand,
-    Operator,
-    Prefixed,
-    Primitive,
     Produce,
     Production,
     Read,
-    Sum,
     Symbol,
 )
-from .resolve_expressions import RULES, Expressions, Scope
-from .resolve_names import Entry, Names, Problem, terms_of
-from .resolve_operators import Operators
-from .resolve_textures import Textures
-from .source import Span
+from .resolve_expressions import RULES, Expressions
+from .resolve_names import Names
+from .resolve_terms import Terms
 
 # Far above what people write; a chain of nested ifs without else doubles with each.
 MAX_CASES = 10_000
 
-OPERAND_KINDS = ("selection", "primitive")
-
 
 class Rules:
-    """``mesh`` loads a mesh file and gives its index."""
-
-    def __init__(
-        self,
-        names: Names,
-        expressions: Expressions,
-        operators: Operators,
-        textures: Textures,
-        mesh: Callable[[syntax.Call], int],
-    ) -> None:
-        self.names, self.expressions, self.operators = names, expressions, operators
-        self.textures, self.mesh = textures, mesh
+    def __init__(self, names: Names, expressions: Expressions, terms: Terms) -> None:
+        self.names, self.expressions, self.terms = names, expressions, terms
         self.rules = 0
-        self.entries: dict[str, tuple[Operator, ...]] = {}
-        self._reached: dict[str, frozenset[str]] | None = None
         self._counted: dict[int, tuple[int, Production]] = {}
 
     # --- Selections
@@ -77,7 +48,9 @@ class Rules:
                 after = node.productions[i + 1]
                 note = Note(production.span, "this rule always applies")
                 message = "this rule can't be reached: the one before it always applies"
-                self.names.diagnostics.add("unreachable-rule", after.span, message, "give the first an `if`", (note,))
+                self.names.diagnostics.add(
+                    "unreachable-rule", after.span, message, "give the first an `if`", (note,)
+                )
             rest = self._production(production, node, rest, firsts[i])
             if self._cases(rest) > MAX_CASES:
                 message = f"the rules of '{node.name.name}' make more than {MAX_CASES:,} cases"
@@ -102,11 +75,15 @@ class Rules:
         self.rules += _rule_count(production)
         return first
 
-    def _production(self, node: syntax.Production, owner: syntax.Selection, rest: Production, number: int) -> Production:
+    def _production(
+        self, node: syntax.Production, owner: syntax.Selection, rest: Production, number: int
+    ) -> Production:
         """``rest`` is what applies when no guard of ``node`` does; ``number`` is its first rule's."""
         if isinstance(node, syntax.Rule):
             return self._rule(node, owner, number)
-        test = self._guarded(lambda: self.expressions.number(node.test, RULES), Constant(1.0, node.test.span))
+        test = self.names.reporting(
+            lambda: self.expressions.number(node.test, RULES), Constant(1.0, node.test.span)
+        )
         then = self._production(node.then, owner, rest, number)
         otherwise = rest
         if node.otherwise is not None:
@@ -119,29 +96,35 @@ class Rules:
         for i, alternative in enumerate(node.alternatives):
             body: Operand = Empty(alternative.span)
             if alternative.body is not None:
-                body = self.union(alternative.body, owner.name.name)
+                body = self.terms.union(alternative.body, owner.name.name)
             produced.append(Produce(number + i, body, alternative.span))
         weights = [alternative.weight for alternative in node.alternatives]
         if weights == [None]:
             return produced[0]
         if None in weights:
             at = node.alternatives[weights.index(None)].span
-            self.names.diagnostics.add("wrong-arguments", at, "this alternative has no weight", "write 1: before it")
+            self.names.diagnostics.add(
+                "wrong-arguments", at, "this alternative has no weight", "write 1: before it"
+            )
             return produced[0]
         numbers = [self._weight(weight) for weight in weights if weight is not None]
         if all(isinstance(number, Constant) and number.value == 0 for number in numbers):
-            self.names.diagnostics.add("weights", node.span, "all weights of this rule are 0", "give one a weight above 0")
+            self.names.diagnostics.add(
+                "weights", node.span, "all weights of this rule are 0", "give one a weight above 0"
+            )
             return produced[0]
         return Choose(tuple(zip(numbers, produced)), node.span)
 
     def _weight(self, node: syntax.Expression):
-        weight = self._guarded(lambda: self.expressions.number(node, RULES), Constant(1.0, node.span))
+        weight = self.names.reporting(lambda: self.expressions.number(node, RULES), Constant(1.0, node.span))
         try:
             folded = fold(weight) if _closed(weight) else weight
         except NotFinite:
             return weight  # the check reports it
         if isinstance(folded, Constant) and folded.value < 0:
-            self.names.diagnostics.add("weights", node.span, f"a weight can't be negative, this is {folded.value:g}")
+            self.names.diagnostics.add(
+                "weights", node.span, f"a weight can't be negative, this is {folded.value:g}"
+            )
             return Constant(1.0, node.span)
         return folded
 
@@ -157,183 +140,9 @@ class Rules:
             wanted = [each.name for each in owner.parameters]
             if given != wanted or len(given) != len(node.target.arguments):
                 hint = f"write {owner.name.name} -> … ; the parameters stand in the Selection's head"
-                self.names.diagnostics.add("wrong-arguments", node.target.span, "a rule's left side takes no arguments", hint)
-
-    def _guarded(self, read: Callable, fallback):
-        try:
-            return read()
-        except Problem as problem:
-            problem.report(self.names.diagnostics)
-            return fallback
-
-    # --- terms
-
-    def union(self, node: syntax.Union, owner: str) -> Operand:
-        terms = tuple(self._guarded(lambda: self._term(term, owner), Empty(term.span)) for term in node.terms)
-        return terms[0] if len(terms) == 1 else Sum(terms, node.span)
-
-    def _term(self, node: syntax.Term, owner: str) -> Operand:
-        if not node.items:
-            return Empty(node.span)
-        *prefixes, last = node.items
-        operators: list[tuple[Operator, Span]] = []
-        for item in prefixes:
-            operators += [(operator, item.span) for operator in self._operators(item)]
-        operand = self.operand(last, owner, RULES)
-        for operator, span in reversed(operators):
-            operand = Prefixed(operator, operand, span)
-        return operand
-
-    def _operators(self, item: syntax.Node) -> list[Operator]:
-        """The operators that ``item``, not the last of its term, stands for."""
-        if isinstance(item, syntax.Inline):
-            return self.operators.inline(item)
-        if isinstance(item, syntax.Group):
-            raise Problem("wrong-kind", item.span, "a group in brackets is an operand: nothing can follow it", "join with '+'")
-        if isinstance(item, syntax.Block):
-            raise Problem("wrong-kind", item.span, *_block_in_rule(item))
-        name = item.name if isinstance(item, syntax.Call) else item
-        assert isinstance(name, syntax.Name)
-        if name.name in vocabulary.PRIMITIVES or self._is(name, "selection"):
-            what = "a primitive" if name.name in vocabulary.PRIMITIVES else "a Selection"
-            hint = "join operands with '+'; operators are Calculations, Transformations and textures"
-            raise Problem("wrong-kind", item.span, f"'{name.name}' is {what}, an operand: nothing can follow it", hint)
-        if name.name in vocabulary.OPERATIONS:
-            hint = f"write [ {vocabulary.OPERATIONS[name.name].signature} ], or name it: Transformation T {{ … }}"
-            raise Problem("wrong-kind", name.span, f"the operation '{name.name}' stands outside of brackets", hint)
-        entry = self.names.find(name, ("calculation", "transformation", "texture"), "an operator")
-        if isinstance(item, syntax.Call):
-            hint = "only Selections take arguments; assign before: [ a = 1 ]"
-            raise Problem("wrong-arguments", item.span, f"'{name.name}' takes no arguments", hint)
-        if entry.kind == "texture":
-            return [self.textures.paint(entry, name.span)]
-        return [self.operators.declared(entry)]
-
-    def operand(self, item: syntax.Node, owner: str, scope: Scope) -> Operand:
-        """What ``item`` stands for at the end of a term in a rule of ``owner`` ('' for a scene object)."""
-        if isinstance(item, syntax.Group):
-            return self.union(item.union, owner)
-        if isinstance(item, syntax.Inline):
-            raise Problem("missing", item.span, "the operators in brackets have nothing to act on", "write an operand after them")
-        if isinstance(item, syntax.Block):
-            raise Problem("wrong-kind", item.span, *_block_in_rule(item))
-        name = item.name if isinstance(item, syntax.Call) else item
-        assert isinstance(name, syntax.Name)
-        arguments = item.arguments if isinstance(item, syntax.Call) else ()
-        if name.name == "mesh" and isinstance(item, syntax.Call):
-            return MeshLeaf(self.mesh(item), item.span)
-        if name.name in vocabulary.PRIMITIVES:
-            return self._primitive(name, item.span, arguments, scope)
-        if name.name == "plane":
-            hint = "planes are endless: write plane { … } as a scene block, or use square"
-            raise Problem("wrong-kind", name.span, "a plane can't be produced by rules", hint)
-        entry = self.names.entries.get(name.name)
-        if entry is not None and entry.kind in ("calculation", "transformation", "texture"):
-            self.names.find(name, (entry.kind,), "an operator")
-            message = f"the operator '{name.name}' has nothing to act on"
-            raise Problem("missing", name.span, message, "write an operand after it: a Selection or a primitive")
-        entry = self.names.find(name, OPERAND_KINDS, "a Selection or a primitive")
-        return self.enter(entry, item.span, arguments, owner, scope)
-
-    def _primitive(self, name: syntax.Name, span: Span, arguments: tuple, scope: Scope) -> Operand:
-        row = vocabulary.PRIMITIVES[name.name]
-        if not row.accepts(len(arguments)):
-            message = f"{row.name} takes {row.expected}, not {len(arguments)}"
-            raise Problem("wrong-arguments", span, message, f"write {row.signature}")
-        numbers = tuple(self.expressions.number(argument, scope) for argument in arguments)
-        for number, argument in zip(numbers, arguments):
-            if isinstance(number, Constant) and row.range is not None and number.value not in row.range:
-                message = f"{row.name}'s argument must be {row.range}, not {number.value:g}"
-                raise Problem("wrong-value", argument.span, message)
-        if row.name == "cone" and not numbers:
-            numbers = (Constant(0.0, span),)
-        return Primitive(row.name, numbers, span)
-
-    # --- references to Selections
-
-    def enter(self, entry: Entry, span: Span, arguments: tuple, owner: str, scope: Scope) -> Operand:
-        """A reference from a rule of ``owner`` ('' from a scene object): arguments, entry action, Enter."""
-        node = entry.node
-        assert isinstance(node, syntax.Selection)
-        name = entry.definition.name
-        operand: Operand = Enter(name, span)
-        if not owner or owner not in self.reached(name):
-            for operator in reversed(self.entry_action(node)):
-                operand = Prefixed(operator, operand, span)
-        if len(arguments) != len(node.parameters):
-            wanted = ", ".join(parameter.name for parameter in node.parameters)
-            counted = f"{len(node.parameters)} argument{'s' * (len(node.parameters) != 1)}"
-            message = f"{name} takes {counted if node.parameters else 'no arguments'}, not {len(arguments)}"
-            hint = f"write {name}({wanted})" if wanted else f"write {name}"
-            raise Problem("wrong-arguments", span, message, hint, (Note(node.name.span, f"'{name}' is defined here"),))
-        if arguments:
-            values = [self.expressions.number(argument, scope) for argument in arguments]
-            pairs = zip(node.parameters, values, arguments)
-            assigns = tuple(Assign(parameter.name, value, argument.span) for parameter, value, argument in pairs)
-            operand = Prefixed(Calculate("", assigns, together=True, span=span), operand, span)
-        return operand
-
-    def entry_action(self, node: syntax.Selection) -> tuple[Operator, ...]:
-        """The Calculations of the entry action, outermost first; reported once."""
-        name = node.name.name
-        if name not in self.entries:
-            self.entries[name] = ()
-            if node.entry is not None:
-                self.entries[name] = self._guarded(lambda: self._entry_action(node), ())
-        return self.entries[name]
-
-    def _entry_action(self, node: syntax.Selection) -> tuple[Operator, ...]:
-        assert node.entry is not None
-        *prefixes, last = node.entry.items
-        if not isinstance(last, syntax.Name) or last.name != node.name.name:
-            hint = f"write C_init {node.name.name}; with a Calculation of yours"
-            raise Problem("wrong-kind", last.span, "an entry action ends with its Selection's own name", hint)
-        operators: list[Operator] = []
-        for item in prefixes:
-            for operator in self._operators(item):
-                if not isinstance(operator, Calculate):
-                    raise Problem("wrong-kind", item.span, "an entry action is made of Calculations only")
-                operators.append(operator)
-        return tuple(operators)
-
-    def reached(self, name: str) -> frozenset[str]:
-        """The Selections that productions lead to from ``name``; itself only through a cycle."""
-        if self._reached is None:
-            self._reached = _closure(self._edges())
-        return self._reached[name]
-
-    def _edges(self) -> dict[str, set[str]]:
-        edges: dict[str, set[str]] = {}
-        for name, entry in self.names.entries.items():
-            if isinstance(entry.node, syntax.Selection):
-                found = edges.setdefault(name, set())
-                for term in terms_of(entry.node):
-                    if term is entry.node.entry or not term.items:
-                        continue
-                    last = term.items[-1]
-                    target = last.name if isinstance(last, syntax.Call) else last
-                    if isinstance(target, syntax.Name) and self._is(target, "selection"):
-                        found.add(target.name)
-        return edges
-
-    def _is(self, name: syntax.Name, kind: str) -> bool:
-        entry = self.names.entries.get(name.name)
-        return entry is not None and entry.kind == kind
-
-
-def _closure(edges: dict[str, set[str]]) -> dict[str, frozenset[str]]:
-    """The transitive closure of one step and more."""
-    reached = {}
-    for start in edges:
-        found: set[str] = set()
-        waiting = list(edges[start])
-        while waiting:
-            name = waiting.pop()
-            if name not in found:
-                found.add(name)
-                waiting += edges[name]
-        reached[start] = frozenset(found)
-    return reached
+                self.names.diagnostics.add(
+                    "wrong-arguments", node.target.span, "a rule's left side takes no arguments", hint
+                )
 
 
 def _always_applies(production: syntax.Production | None) -> bool:
@@ -352,12 +161,3 @@ def _closed(expression) -> bool:
     if isinstance(expression, Apply):
         return expression.operation not in ("rand", "hash") and all(map(_closed, expression.arguments))
     return not isinstance(expression, Read)
-
-
-def _block_in_rule(item: syntax.Block) -> tuple[str, str]:
-    name = item.name.name
-    if name in ("texture", "pigment", "finish"):
-        return f"a {name} block can't stand in a rule", "name it: Texture Leaf { pigment { … } } and write Leaf"
-    if name in vocabulary.PRIMITIVES:
-        return f"the scene block '{name}' can't stand in a rule", f"write [ trans … ] {name}: rules have unit shapes"
-    return f"the block '{name}' can't stand in a rule", "scene blocks stand outside of Selections"

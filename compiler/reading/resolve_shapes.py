@@ -29,7 +29,9 @@ def placed(primitive: str, arguments: tuple[float, ...], matrix: affine.Matrix, 
     return Prefixed(Transform("", (Step("matrix", numbers, span),), span), leaf, span)
 
 
-def stepped(primitive: str, arguments: tuple[float, ...], steps: list[tuple[str, tuple]], span: Span) -> Operand:
+def stepped(
+    primitive: str, arguments: tuple[float, ...], steps: list[tuple[str, tuple]], span: Span
+) -> Operand:
     """A unit shape in named steps, which read better than a matrix; those that do nothing are left out."""
     made = tuple(
         Step(name, tuple(map(Constant, values)), span)
@@ -142,8 +144,18 @@ def _disc(items: Items, span: Span) -> Operand:
     if size == 0:
         raise Problem("degenerate", span, "this disc's normal is zero")
     if items.starts_colour():
-        raise Problem("unsupported", items.peek().span, "a disc with a hole isn't supported", "leave the fourth argument out")
-    return placed("disc", (), _along(centre, tuple(map(sum, zip(centre, affine.scaled(normal, radius / size)))), radius), span)
+        raise Problem(
+            "unsupported",
+            items.peek().span,
+            "a disc with a hole isn't supported",
+            "leave the fourth argument out",
+        )
+    return placed(
+        "disc",
+        (),
+        _along(centre, tuple(map(sum, zip(centre, affine.scaled(normal, radius / size)))), radius),
+        span,
+    )
 
 
 _SHAPES: dict[str, Callable[[Items, Span], Operand]] = {

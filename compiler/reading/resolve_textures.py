@@ -117,8 +117,15 @@ class Textures:
         block = node.items[0]
         assert isinstance(block, syntax.Block)
         if len(node.items) > 1:
-            raise Problem("wrong-value", node.items[1].span, f"#declare {node.name.name} has more than one value")
-        read = {"texture": self.texture, "pigment": self.pigment, "finish": self.finish, "color_map": self.color_map}
+            raise Problem(
+                "wrong-value", node.items[1].span, f"#declare {node.name.name} has more than one value"
+            )
+        read = {
+            "texture": self.texture,
+            "pigment": self.pigment,
+            "finish": self.finish,
+            "color_map": self.color_map,
+        }
         return read[entry.kind](block, BLOCKS)
 
     def _named(self, items: Items, kind: str):
@@ -132,7 +139,12 @@ class Textures:
         value = self.declared(entry, name.span)
         if isinstance(value, Look) and not items.scope.reads and not value.is_constant:
             hint = f"use '{name.name}' as an operator in a production, or declare a constant texture"
-            raise Problem("wrong-kind", name.span, f"the Texture '{name.name}' reads parameters, which have no value here", hint)
+            raise Problem(
+                "wrong-kind",
+                name.span,
+                f"the Texture '{name.name}' reads parameters, which have no value here",
+                hint,
+            )
         return value
 
     # --- blocks
@@ -146,7 +158,12 @@ class Textures:
             if word == "pigment" and isinstance(items.peek(), syntax.Block):
                 if moved:
                     hint = "write the pigment first: what stands before it isn't moved in POV-Ray"
-                    raise Problem("wrong-order", items.peek().span, "a pigment after the texture's transformations", hint)
+                    raise Problem(
+                        "wrong-order",
+                        items.peek().span,
+                        "a pigment after the texture's transformations",
+                        hint,
+                    )
                 look = replace(look, pigment=self.pigment(items.take(), scope, look.pigment))
             elif word == "finish" and isinstance(items.peek(), syntax.Block):
                 look = replace(look, finish=self.finish(items.take(), scope, look.finish))
@@ -172,7 +189,9 @@ class Textures:
                 direction = items.vector("the gradient's direction")
                 if not any(direction):
                     raise Problem("degenerate", span, "the gradient's direction is zero")
-                entries = pigment.entries if len(pigment.entries) > 1 and pigment.pattern != "checker" else GREYS
+                entries = (
+                    pigment.entries if len(pigment.entries) > 1 and pigment.pattern != "checker" else GREYS
+                )
                 pigment = replace(pigment, pattern="gradient", direction=direction, entries=entries)
             elif word in ("color_map", "colour_map") and is_block:
                 pigment = replace(pigment, entries=self.color_map(items.take(), scope))
@@ -185,7 +204,9 @@ class Textures:
             else:
                 raise self._misfit(items, "pigment", [*PROPERTIES["pigment"], *TRANSFORMATIONS])
         if pigment.pattern == "solid" and len(pigment.entries) != 1:
-            raise Problem("wrong-value", block.span, "a color_map needs a pattern", "write gradient z before it")
+            raise Problem(
+                "wrong-value", block.span, "a color_map needs a pattern", "write gradient z before it"
+            )
         return pigment
 
     def _checkers(self, items: Items) -> tuple[ColourEntry, ...]:
@@ -206,7 +227,12 @@ class Textures:
         while items:
             item = items.take()
             if not isinstance(item, syntax.MapEntry):
-                raise Problem("wrong-value", item.span, "a color_map holds entries", "write [0 color Red] [1 color Blue]")
+                raise Problem(
+                    "wrong-value",
+                    item.span,
+                    "a color_map holds entries",
+                    "write [0 color Red] [1 color Blue]",
+                )
             inner = Items("an entry", item.span, item.items, self.expressions, scope)
             position = inner.constant("an entry's position")
             if not last <= position <= 1:
@@ -217,10 +243,14 @@ class Textures:
             if inner:
                 raise inner.misfit(())
         if not entries:
-            raise Problem("wrong-value", block.span, "this color_map is empty", "write [0 color Red] [1 color Blue]")
+            raise Problem(
+                "wrong-value", block.span, "this color_map is empty", "write [0 color Red] [1 color Blue]"
+            )
         return tuple(entries)
 
-    def finish(self, block: syntax.Block, scope: Scope, base: dict | None = None) -> dict[str, tuple[Expression, ...]]:
+    def finish(
+        self, block: syntax.Block, scope: Scope, base: dict | None = None
+    ) -> dict[str, tuple[Expression, ...]]:
         items = self.items(block, scope)
         values = dict(self._named(items, "finish") or base or {})
         rows = PROPERTIES["finish"]
@@ -249,7 +279,12 @@ class Textures:
     def _misfit(self, items: Items, kind: str, rows: list[str]) -> Problem:
         """The next item fits nothing in a block of this ``kind``: perhaps a name that isn't defined."""
         item = items.peek()
-        if not isinstance(item, syntax.Name) or items.at > 0 or item.name in MODIFIERS or vocabulary.kind_of(item.name):
+        if (
+            not isinstance(item, syntax.Name)
+            or items.at > 0
+            or item.name in MODIFIERS
+            or vocabulary.kind_of(item.name)
+        ):
             return items.misfit(rows)
         try:
             self.names.find(item, (kind,), f"a {kind}")
@@ -266,14 +301,18 @@ class Textures:
         item = items.take()
         word = item.name.name if isinstance(item, syntax.Block | syntax.Call) else item.name  # type: ignore
         if isinstance(item, syntax.Block | syntax.Call):
-            raise Problem("wrong-arguments", item.span, f"'{word}' takes a vector", f"write {MODIFIERS[word].signature}")
+            raise Problem(
+                "wrong-arguments", item.span, f"'{word}' takes a vector", f"write {MODIFIERS[word].signature}"
+            )
         begin = items.at
         plain = items.peek()
         if word == "matrix":
             values = items.vector("a matrix", 12)
             step = Step("matrix", tuple(map(Constant, values)), item.span)
             if affine.determinant(affine.of_step(step)) == 0:
-                raise Problem("degenerate", plain.span, "this matrix flattens what it acts on", "its determinant is 0")
+                raise Problem(
+                    "degenerate", plain.span, "this matrix flattens what it acts on", "its determinant is 0"
+                )
             return (step,)
         values = items.vector(f"'{word}'")
         span = item.span.to(items.items[begin].span)

@@ -61,7 +61,9 @@ def ways(production: Production, guards: tuple = (), weights: tuple = ()) -> Ite
             yield Way(guards, weights, operators, leaf, isinstance(production, Produce))
 
 
-def leaves(operand: Operand, operators: tuple[Operator, ...] = ()) -> Iterator[tuple[tuple[Operator, ...], Operand]]:
+def leaves(
+    operand: Operand, operators: tuple[Operator, ...] = ()
+) -> Iterator[tuple[tuple[Operator, ...], Operand]]:
     """The leaves of an operand, each with the operators on its way, outermost first."""
     while isinstance(operand, Prefixed):
         operators = (*operators, operand.operator)

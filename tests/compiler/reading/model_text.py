@@ -1,7 +1,7 @@
 """The model as short text, for tests: operators in order, operands as in a scene.
 
-    {cntTree = cntTree - 1} [trans 0 0 1.99] >Tree          Prefixed, Prefixed, Enter
-    if cntTrunk > 0: ... else: ...                          Branch
+{cntTree = cntTree - 1} [trans 0 0 1.99] >Tree          Prefixed, Prefixed, Enter
+if cntTrunk > 0: ... else: ...                          Branch
 """
 
 from __future__ import annotations
@@ -13,7 +13,15 @@ from plsys.compiler.reading.parse import parse
 from plsys.compiler.reading.resolve import resolve
 from plsys.compiler.reading.source import Source
 
-SIGNS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/", "less": "<", "greater": ">", "equal": "=="}
+SIGNS = {
+    "add": "+",
+    "subtract": "-",
+    "multiply": "*",
+    "divide": "/",
+    "less": "<",
+    "greater": ">",
+    "equal": "==",
+}
 
 
 def read(text: str, **options) -> tuple[m.Model, Diagnostics]:
@@ -55,7 +63,9 @@ def expression(node: m.Expression) -> str:
 def operator(node: m.Operator) -> str:
     if isinstance(node, m.Calculate):
         inside = "; ".join(
-            f"variants {expression(each.count)}" if isinstance(each, m.Variants) else f"{each.parameter} = {expression(each.value)}"
+            f"variants {expression(each.count)}"
+            if isinstance(each, m.Variants)
+            else f"{each.parameter} = {expression(each.value)}"
             for each in node.statements
         )
         return f"{node.name}{'<' if node.together else '{'}{inside}{'>' if node.together else '}'}"

@@ -10,7 +10,6 @@ import os
 from pathlib import Path
 
 import pytest
-
 from model_text import codes, read
 from plsys.compiler.reading.check import check
 from plsys.compiler.reading.codes import CODES
@@ -71,7 +70,10 @@ def test_a_good_scene_has_nothing_to_say():
 
 
 def test_assigned_on_every_path():
-    assert codes("Selection A(n) { if (n > 0) A -> [ k = n ] B; } Selection B { B -> cone(k); } object { A(2) }") == []
+    assert (
+        codes("Selection A(n) { if (n > 0) A -> [ k = n ] B; } Selection B { B -> cone(k); } object { A(2) }")
+        == []
+    )
 
 
 def test_assigned_on_no_path():
@@ -89,15 +91,21 @@ def test_siblings_do_not_see_what_a_calculation_assigns():
 
 
 def test_what_is_evaluated_only_sometimes_is_not_certain():
-    assert codes("Selection A { A -> [ k = 1 ] cone(k) + cone(rand(1) > 2 && k); } object { A }") == ["maybe-unassigned"]
+    assert codes("Selection A { A -> [ k = 1 ] cone(k) + cone(rand(1) > 2 && k); } object { A }") == [
+        "maybe-unassigned"
+    ]
 
 
 def test_a_read_for_a_dead_parameter_is_no_error():
-    assert "unassigned" not in codes("Calculation D { z1 = k; } Selection A { A -> D box + [ k = 1 ] cone(k); } object { A }")
+    assert "unassigned" not in codes(
+        "Calculation D { z1 = k; } Selection A { A -> D box + [ k = 1 ] cone(k); } object { A }"
+    )
 
 
 def test_arguments_are_in_the_callers_scope():
-    assert codes("Selection A(p, q) { A -> cone(p + q); } Selection B { B -> A(1, p); } object { B }") == ["unassigned"]
+    assert codes("Selection A(p, q) { A -> cone(p + q); } Selection B { B -> A(1, p); } object { B }") == [
+        "unassigned"
+    ]
 
 
 # --- recursion
@@ -105,10 +113,17 @@ def test_arguments_are_in_the_callers_scope():
 
 def test_endless_recursion():
     assert codes("Selection A { A -> box + [ trans 0 0 1 ] A; } object { A }") == ["endless"]
-    assert codes("Selection A { A -> B; } Selection B { B -> [ scale 0.5 ] A + box; } object { A }") == ["endless"]
+    assert codes("Selection A { A -> B; } Selection B { B -> [ scale 0.5 ] A + box; } object { A }") == [
+        "endless"
+    ]
     assert codes("Selection A { A -> 1: A | 2: [ trans 0 0 1 ] A + box; } object { A }") == ["endless"]
-    assert codes("Selection A { if (1 > 0) A -> box + [ trans 0 0 1 ] A; else A -> box; } object { A }") == ["endless", "constant-guard"]
-    assert codes("Selection A { if (rand(1) < 1) A -> box + [ trans 0 0 1 ] A; else A -> box; } object { A }") == ["endless", "constant-guard"]
+    assert codes("Selection A { if (1 > 0) A -> box + [ trans 0 0 1 ] A; else A -> box; } object { A }") == [
+        "endless",
+        "constant-guard",
+    ]
+    assert codes(
+        "Selection A { if (rand(1) < 1) A -> box + [ trans 0 0 1 ] A; else A -> box; } object { A }"
+    ) == ["endless", "constant-guard"]
 
 
 def test_recursion_that_ends_by_weights_is_fine():
@@ -140,7 +155,12 @@ def test_a_division_that_is_never_reached_is_no_error():
 
 
 def test_a_mesh_that_is_missing_or_broken(tmp_path):
-    for name, content in (("a.obj", b""), ("b.obj", b"\x00\xff garbage"), ("c.ply", b"ply\nnonsense"), ("d.stl", b"solid")):
+    for name, content in (
+        ("a.obj", b""),
+        ("b.obj", b"\x00\xff garbage"),
+        ("c.ply", b"ply\nnonsense"),
+        ("d.stl", b"solid"),
+    ):
         (tmp_path / name).write_bytes(content)
         path = tmp_path / "scene.plsys"
         source = Source("scene.plsys", f'object {{ mesh("{name}") }}'.encode(), path)
@@ -153,7 +173,11 @@ def test_a_mesh_keeps_its_triangles_and_normals(tmp_path):
     plain = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
     (tmp_path / "flat.obj").write_text(plain)
     (tmp_path / "smooth.obj").write_text(plain.replace("f 1 2 3 4", "vn 0 0 1\nvn 0 1 1\nf 1//1 2//2 3//1"))
-    source = Source("scene.plsys", b'object { mesh("flat.obj") } object { mesh("smooth.obj") } object { mesh("flat.obj") }', tmp_path / "s.plsys")
+    source = Source(
+        "scene.plsys",
+        b'object { mesh("flat.obj") } object { mesh("smooth.obj") } object { mesh("flat.obj") }',
+        tmp_path / "s.plsys",
+    )
     file, diagnostics = parse(source)
     model = resolve(file, diagnostics)
     assert diagnostics.items == []
@@ -169,12 +193,17 @@ def test_an_editors_open_files_are_what_is_included(tmp_path):
     def loader(path):
         return Source(path.name, opened[path].encode(), path)
 
-    file, diagnostics = parse(Source("scene.plsys", b'#include "lib.plsys" sphere { 0, R }', tmp_path / "scene.plsys"))
+    file, diagnostics = parse(
+        Source("scene.plsys", b'#include "lib.plsys" sphere { 0, R }', tmp_path / "scene.plsys")
+    )
     model = resolve(file, diagnostics, loader=loader)
     assert diagnostics.items == [] and model.files == [tmp_path / "scene.plsys", tmp_path / "lib.plsys"]
 
 
-@pytest.mark.parametrize("text", ["object { }", "union { }", "sphere { }", "camera { location }", "#declare A = texture { }", "mesh { }"])
+@pytest.mark.parametrize(
+    "text",
+    ["object { }", "union { }", "sphere { }", "camera { location }", "#declare A = texture { }", "mesh { }"],
+)
 def test_empty_things_never_crash(text):
     read(text)
 
@@ -184,7 +213,9 @@ def test_empty_things_never_crash(text):
 
 def test_objects_that_double_are_bounded():
     lines = ["#declare A0 = union { sphere { 0, 1 } sphere { x, 1 } }"]
-    lines += [f"#declare A{i + 1} = union {{ object {{ A{i} }} object {{ A{i} translate x }} }}" for i in range(40)]
+    lines += [
+        f"#declare A{i + 1} = union {{ object {{ A{i} }} object {{ A{i} translate x }} }}" for i in range(40)
+    ]
     assert "limit" in codes("\n".join(lines) + "\nobject { A40 }")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
 from model_text import codes, good, objects, operand, production, read, rules
 from plsys.compiler.reading.parse import parse
 from plsys.compiler.reading.resolve import resolve
@@ -68,7 +67,9 @@ def test_weighted_alternatives_each_have_a_number():
 
 def test_a_rule_after_one_that_always_applies_is_an_error():
     assert codes("object { A } Selection A { A -> box; A -> disc; }") == ["unreachable-rule"]
-    assert codes(P + "object { A } Selection A { if (n > 1) A -> box; else A -> disc; A -> sphere; }") == ["unreachable-rule"]
+    assert codes(P + "object { A } Selection A { if (n > 1) A -> box; else A -> disc; A -> sphere; }") == [
+        "unreachable-rule"
+    ]
 
 
 @pytest.mark.parametrize("weights", ["0: box | 0: disc", "w: box | 2: disc"])
@@ -138,7 +139,10 @@ def test_a_declared_texture_is_an_operator_too():
 
 
 def test_arguments_are_assigned_together():
-    assert rules("Selection A(p, q) { if (p > 0) A -> A(q, p - 1); }") == "if (p > 0) {0: <p = q; q = (p - 1)> >A} else {nothing}"
+    assert (
+        rules("Selection A(p, q) { if (p > 0) A -> A(q, p - 1); }")
+        == "if (p > 0) {0: <p = q; q = (p - 1)> >A} else {nothing}"
+    )
 
 
 ENTRY = "Calculation C { k = 1; } "
@@ -151,11 +155,14 @@ def test_the_object_runs_the_entry_action_after_the_arguments():
 
 
 def test_a_reference_runs_the_entry_action_unless_it_leads_back():
-    text = ENTRY + """object { Plant }
+    text = (
+        ENTRY
+        + """object { Plant }
         Selection Plant { if (rand(1) < 0.5) Plant -> Leaf + Stem; }
         Selection Stem  { C Stem; if (k > 0) Stem -> [ --k ] Side; else Stem -> Leaf; }
         Selection Side  { C Side; Side -> Stem + Leaf; }
         Selection Leaf  { C Leaf; Leaf -> [ scale k ] disc; }"""
+    )
     # Plant → Stem: Plant isn't reached from Stem, so the action runs. Stem ⇄ Side reach each other: it doesn't.
     assert rules(text, "Plant").startswith("if (rand(1) < 0.5) {0: (C{k = 1} >Leaf + C{k = 1} >Stem)}")
     assert rules(text, "Stem") == "if (k > 0) {1: {k = (k - 1)} >Side} else {2: C{k = 1} >Leaf}"
@@ -163,13 +170,18 @@ def test_a_reference_runs_the_entry_action_unless_it_leads_back():
 
 
 def test_reachability_ignores_guards():
-    text = ENTRY + """object { A } Selection A { C A; A -> B; } Selection B { C B; if (0) B -> A; else B -> box; }"""
+    text = (
+        ENTRY
+        + """object { A } Selection A { C A; A -> B; } Selection B { C B; if (0) B -> A; else B -> box; }"""
+    )
     assert rules(text, "A") == "0: >B"
     assert rules(text, "B").startswith("if 0 {1: >A}")
 
 
 def test_an_entry_action_takes_calculations_only():
-    assert codes("Transformation T { scale 2; } Selection A { T A; A -> box; } object { A }") == ["wrong-kind"]
+    assert codes("Transformation T { scale 2; } Selection A { T A; A -> box; } object { A }") == [
+        "wrong-kind"
+    ]
 
 
 def test_objects_that_place_a_symbol_are_counted():

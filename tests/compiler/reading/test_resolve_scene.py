@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-
 from model_text import codes, good, objects, texture
 from plsys.compiler.reading import affine
 from plsys.compiler.reading.model import Paint, Prefixed, Primitive, Transform
@@ -32,12 +31,18 @@ def unit_image(text: str, *points: tuple) -> list[tuple]:
         matrix = affine.compose(matrix, affine.of_steps(operand.operator.steps))
         operand = operand.operand
     assert isinstance(operand, Primitive)
-    return [tuple(round(value, 12) + 0.0 for value in affine.transform_point(matrix, point)) for point in points]
+    return [
+        tuple(round(value, 12) + 0.0 for value in affine.transform_point(matrix, point)) for point in points
+    ]
 
 
 def record(text: str, kind: str) -> dict:
     model = good(text)
-    return dict({"camera": model.camera, "settings": model.settings, "light": model.lights and model.lights[0]}[kind].values)
+    return dict(
+        {"camera": model.camera, "settings": model.settings, "light": model.lights and model.lights[0]}[
+            kind
+        ].values
+    )
 
 
 # --- shapes
@@ -84,7 +89,9 @@ def test_plane_torus_triangle_disc():
 
 
 def test_mesh_of_triangles():
-    mesh = good("""mesh { triangle { 0, x, y } smooth_triangle { x, z, x + y, <0, 1, 1>, y, z } }""").meshes[0]
+    mesh = good("""mesh { triangle { 0, x, y } smooth_triangle { x, z, x + y, <0, 1, 1>, y, z } }""").meshes[
+        0
+    ]
     assert mesh.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
     assert mesh.triangles.tolist() == [[0, 1, 2], [1, 3, 2]]
     assert mesh.normals[mesh.normal_triangles[0]].tolist() == [[0, 0, 1]] * 3
@@ -117,8 +124,14 @@ def test_a_texture_stands_where_it_is_written():
 
 
 def test_a_finish_joins_the_pigment_where_that_stands():
-    assert body("sphere { 0, 1 pigment { Red } translate x finish { phong 1 } }") == "[trans 1 0 0] (phong 1 | 0,1,0,0,0,0) sphere"
-    assert body("sphere { 0, 1 finish { phong 1 } translate x pigment { Red } }") == "(phong 1 | 0,1,0,0,0,0) [trans 1 0 0] sphere"
+    assert (
+        body("sphere { 0, 1 pigment { Red } translate x finish { phong 1 } }")
+        == "[trans 1 0 0] (phong 1 | 0,1,0,0,0,0) sphere"
+    )
+    assert (
+        body("sphere { 0, 1 finish { phong 1 } translate x pigment { Red } }")
+        == "(phong 1 | 0,1,0,0,0,0) [trans 1 0 0] sphere"
+    )
 
 
 def test_a_unions_texture_is_round_those_inside():
@@ -175,7 +188,13 @@ def test_textures_start_from_declared_ones():
 def test_every_finish():
     shown = paint("""finish { ambient rgb <0.1, 0.2, 0.3> emission 0.1 diffuse 0.7 brilliance 2 phong 0.3 phong_size 60
         specular 0.4 roughness 0.01 reflection { 0.25 } }""")
-    for value in ("ambient 0.1 0.2 0.3", "emission 0.1 0.1 0.1", "brilliance 2", "roughness 0.01", "reflection 0.25 0.25 0.25"):
+    for value in (
+        "ambient 0.1 0.2 0.3",
+        "emission 0.1 0.1 0.1",
+        "brilliance 2",
+        "roughness 0.01",
+        "reflection 0.25 0.25 0.25",
+    ):
         assert value in shown
     assert shown.endswith("0,0,0,0,0,0")  # without a pigment: black
 
@@ -184,7 +203,9 @@ def test_every_finish():
 
 
 def test_camera():
-    values = record("camera { location <0, -14, 5> sky z right <-4/3, 0, 0> look_at <0, 0, 5> angle 45 }", "camera")
+    values = record(
+        "camera { location <0, -14, 5> sky z right <-4/3, 0, 0> look_at <0, 0, 5> angle 45 }", "camera"
+    )
     assert values == {
         "location": (0, -14, 5), "sky": (0, 0, 1), "right": (-4 / 3, 0, 0), "look_at": (0, 0, 5), "has_look_at": (1,),
         "angle": (45,),
@@ -203,23 +224,45 @@ def test_camera_angle_out_of_range(angle):
 
 def test_lights():
     assert record("light_source { <1, 2, 3>, White }", "light") == {"location": (1, 2, 3), "color": (1, 1, 1)}
-    values = record("light_source { y*3 color rgb 0.5 spotlight point_at x radius 5 falloff 10 tightness 2 shadowless translate z }", "light")
+    values = record(
+        "light_source { y*3 color rgb 0.5 spotlight point_at x radius 5 falloff 10 tightness 2 translate z }",
+        "light",
+    )
     assert values["location"] == (0, 3, 1) and values["point_at"] == (1, 0, 1)
-    assert values["spotlight"] == values["shadowless"] == (1,)
-    assert record("light_source { 5*y, rgb 1 parallel fade_distance 3 fade_power 2 }", "light")["fade_power"] == (2,)
+    assert values["spotlight"] == (1,)
+    both = record("light_source { y*3 color rgb 0.5 spotlight point_at x shadowless }", "light")
+    assert both["shadowless"] == (1,) and "spotlight" not in both  # as in POV-Ray, the last of the two counts
+    assert record("light_source { 5*y, rgb 1 parallel fade_distance 3 fade_power 2 }", "light")[
+        "fade_power"
+    ] == (2,)
 
 
 def test_settings():
-    values = record("global_settings { assumed_gamma 1 max_trace_level 3 adc_bailout 0.1 ambient_light rgb 2 seed 9 } background { Red }", "settings")
-    assert values == {"max_trace_level": (3,), "adc_bailout": (0.1,), "ambient_light": (2, 2, 2), "seed": (9,), "background": (1, 0, 0)}
+    values = record(
+        "global_settings { assumed_gamma 1 max_trace_level 3 adc_bailout 0.1 ambient_light rgb 2 seed 9 } background { Red }",
+        "settings",
+    )
+    assert values == {
+        "max_trace_level": (3,),
+        "adc_bailout": (0.1,),
+        "ambient_light": (2, 2, 2),
+        "seed": (9,),
+        "background": (1, 0, 0),
+    }
     assert record("global_settings { seed 9 } sphere { 0, 1 }", "settings") == {"seed": (9,)}
 
 
 def test_names_in_blocks():
-    text = "Parameter h = 3; #declare V = <1, 2, 3>; #declare C = rgb V/4; sphere { V*2 + h*z, h pigment { C } }"
+    text = (
+        "Parameter h = 3; #declare V = <1, 2, 3>; #declare C = rgb V/4; sphere { V*2 + h*z, h pigment { C } }"
+    )
     assert body(text) == "(0,0.25,0.5,0.75,0,0) [trans 2 4 9; scale_uniform 3] sphere"
 
 
 def test_a_parameter_has_no_value_in_a_block():
-    assert codes("Calculation C { a = 1; } Selection A { A -> C cone(a); } object { A } sphere { 0, a }") == ["wrong-kind"]
-    assert codes("Texture L { pigment { rgb a } } Selection A { A -> [ a = 1 ] L disc; } object { A texture { L } }") == ["wrong-kind"]
+    assert codes("Calculation C { a = 1; } Selection A { A -> C cone(a); } object { A } sphere { 0, a }") == [
+        "wrong-kind"
+    ]
+    assert codes(
+        "Texture L { pigment { rgb a } } Selection A { A -> [ a = 1 ] L disc; } object { A texture { L } }"
+    ) == ["wrong-kind"]

@@ -8,7 +8,6 @@ import tomllib
 from pathlib import Path
 
 import pytest
-
 from model_text import good
 from plsys.compiler.reading import vocabulary
 from plsys.compiler.reading.vocabulary import ALL, PROPERTIES, Interval
@@ -49,14 +48,18 @@ def test_what_runs_has_its_row_in_the_bytecode():
 
 
 def test_properties_agree_with_the_records():
-    records = {record["name"]: {value["name"]: value for value in record["values"]} for record in BYTECODE["record"]}
+    records = {
+        record["name"]: {value["name"]: value for value in record["values"]} for record in BYTECODE["record"]
+    }
     blocks = {"camera": "camera", "light": "light_source", "settings": "global_settings", "texture": "finish"}
     for kind, block in blocks.items():
         for name, row in PROPERTIES[block].items():
             value = records[kind].get(name)
             if value is not None:
                 assert value["default"] == row.default, (block, name)
-                assert row.type in (("number", "integer", "flag") if value["size"] == 1 else ("vector", "colour")), name
+                assert row.type in (
+                    ("number", "integer", "flag") if value["size"] == 1 else ("vector", "colour")
+                ), name
     assert set(records["camera"]) - set(PROPERTIES["camera"]) == {"has_look_at"}
     assert set(records["light"]) - set(PROPERTIES["light_source"]) == {"location"}
     assert set(records["texture"]) - set(PROPERTIES["finish"]) == {"pattern", "direction", "matrix"}
@@ -83,4 +86,7 @@ def test_unsupported_names_are_not_names_of_ours():
 
 def test_every_colour_is_linear_and_in_range():
     assert len(vocabulary.COLOURS) > 100
-    assert all(len(parts) in (3, 5) and all(0 <= part <= 1 for part in parts) for parts in vocabulary.COLOURS.values())
+    assert all(
+        len(parts) in (3, 5) and all(0 <= part <= 1 for part in parts)
+        for parts in vocabulary.COLOURS.values()
+    )
