@@ -244,7 +244,7 @@ static bool push(pl_shader *shader, const pl_bounce *bounce, pl_error *error)
 {
     if (shader->sample_rays >= PL_LIMIT_SAMPLE_RAYS)
         return pl_fail(error, PL_ERROR_LIMIT, "max_trace_level",
-                       "more than %d rays came of one sample; a lower max_trace_level or a higher adc_bailout ends them",
+                       "more than %d rays came of one sample; a lower max_trace_level or higher adc_bailout ends them",
                        PL_LIMIT_SAMPLE_RAYS);
     if (shader->count == shader->capacity) {
         const size_t capacity = shader->capacity ? 2 * shader->capacity : 64;
