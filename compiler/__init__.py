@@ -11,9 +11,11 @@ Example::
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Mapping
-
+TYPE_CHECKING = (
+    False  # type checkers take it for True; importing typing would cost more than all of this package
+)
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
 __all__ = ["PlsysError", "SceneError", "compile"]

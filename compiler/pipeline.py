@@ -11,10 +11,10 @@ Example::
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Iterator, Mapping
 
 from .graph.graph import Graph, LeftOut
 from .reading.diagnostics import Diagnostic, Diagnostics, PlsysError, SceneError

@@ -9,7 +9,7 @@ Example: ``betaBr -= 4`` is ``load betaBr · const 4 · subtract · store betaBr
 from __future__ import annotations
 
 import math
-from typing import Callable, Iterable
+from collections.abc import Callable, Iterable
 
 from ..graph import graph as g
 from ..reading.diagnostics import PlsysError

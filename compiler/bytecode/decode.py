@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from typing import Callable
+from collections.abc import Callable
+from itertools import pairwise
 
 from .layout import HEADER_SIZE, NODES_BY_ID, RECORDS_BY_ID
 from .layout_rows import LIMITS, MAGIC, SECTIONS, SENTINEL_FLOAT, SENTINEL_INTEGER, VERSION
@@ -176,7 +177,7 @@ def _field(r: Reader, program: Program, type_: str, nodes: int) -> int | list:
         return [program.constants[r.index(len(program.constants), "constant")] for _ in range(12)]
     if type_ == "slots":
         slots = [r.index(len(program.parameters), "parameter") for _ in range(r.count(1))]
-        for last, slot in zip(slots, slots[1:]):
+        for last, slot in pairwise(slots):
             if slot <= last:
                 raise r.fail(f"a symbol's live parameters don't rise: {slot} after {last}")
         return slots

@@ -14,7 +14,7 @@ Example::
 
 from __future__ import annotations
 
-from typing import Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from .decode import decode
 from .layout import SHAPES_BY_ID

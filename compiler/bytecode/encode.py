@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from typing import Iterable
+from collections.abc import Iterable
 
 from ..graph import graph as g
 from ..reading.diagnostics import PlsysError
@@ -60,12 +60,16 @@ class _Encoder:
         sections["records"] = _listed(self.records.indices)
         sections["constants"] = _listed(struct.pack("<d", value) for value in self.constants.indices)
         sections["strings"] = _listed(_u(len(s.encode())) + s.encode() for s in self.strings.indices)
-        body = b"".join(bytes([id]) + _u(len(sections[name])) + sections[name] for name, id in SECTIONS.items())
+        body = b"".join(
+            bytes([id]) + _u(len(sections[name])) + sections[name] for name, id in SECTIONS.items()
+        )
         return _header(body) + body
 
     def record(self, record: Record) -> int:
         row = RECORDS[record.kind]
-        numbers = {row.values[name].offset + i: v for name, values in record.values for i, v in enumerate(values)}
+        numbers = {
+            row.values[name].offset + i: v for name, values in record.values for i, v in enumerate(values)
+        }
         return self.add_record(record.kind, 0, numbers)
 
     def texture(self, node: g.Texture) -> int:
@@ -104,7 +108,11 @@ class _Encoder:
         """The numbers that a field is written as."""
         if kind == "code":
             # Only guards keep their expression under the field's own name.
-            return [self.assembler.of_value(node.test, node.span) if name == "test" else self.assembler.of_node(node)]
+            return [
+                self.assembler.of_value(node.test, node.span)
+                if name == "test"
+                else self.assembler.of_node(node)
+            ]
         if kind == "cases":
             pairs = [(self.assembler.of_value(weight, node.span), body) for weight, body in node.cases]
             return [len(pairs), *(number for pair in pairs for number in pair)]
@@ -174,7 +182,9 @@ def _mesh(mesh: Mesh, name: int) -> bytes:
 def _header(body: bytes) -> bytes:
     length = HEADER_SIZE + len(body)
     if length > MAX_LENGTH:
-        raise PlsysError(f"the scene's bytecode would take {length:,} bytes, at most {MAX_LENGTH:,} are possible")
+        raise PlsysError(
+            f"the scene's bytecode would take {length:,} bytes, at most {MAX_LENGTH:,} are possible"
+        )
     return struct.pack(
         "<4sHHIIdI", MAGIC, VERSION, 0, length, zlib.crc32(body), SENTINEL_FLOAT, SENTINEL_INTEGER
     )

@@ -7,6 +7,7 @@ nodes goes through an enter node, to a symbol; an application draws at most as o
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 from .layout import OPCODES_BY_ID, SHAPES_BY_ID
 from .layout_rows import LIMITS, PATTERNS, RECORDS
@@ -101,7 +102,9 @@ def _verify_piece(program: Program, start: int) -> Piece:
         for target in _targets(here, len(program.code)):
             before = reached.get(target, (depth, 0))
             if before[0] != depth:
-                reason = f"leads to byte {target} with {depth} values on the stack, another path with {before[0]}"
+                reason = (
+                    f"leads to byte {target} with {depth} values on the stack, another path with {before[0]}"
+                )
                 raise _bad_code(at, reason)
             reached[target] = (depth, max(draws, before[1]))
         at = here.next
@@ -159,7 +162,11 @@ def _verify_node(program: Program, i: int, node: ProgramNode, pieces: dict[int, 
             raise _bad_node(i, node, f"no code starts at byte {field - 1}")
         if piece.results != results:
             raise _bad_node(i, node, f"its code leaves {piece.results} values, not {results}")
-        for name, who in (("assigns", "calculation"), ("transforms", "transformation"), ("paints", "texture")):
+        for name, who in (
+            ("assigns", "calculation"),
+            ("transforms", "transformation"),
+            ("paints", "texture"),
+        ):
             if getattr(piece, name) and name != does:
                 raise _bad_node(i, node, f"its code does what only a {who} may")
         return piece
@@ -206,7 +213,7 @@ def _verify_texture(program: Program, i: int, node: ProgramNode, piece: Piece) -
         raise _bad_node(i, node, f"draws is {node.fields['draws']}, but its code draws {piece.draws} times")
     is_gradient = record.values[TEXTURE.values["pattern"].offset] == PATTERNS["gradient"]
     positions = record.values[TEXTURE.size :: len(TEXTURE.entry)]
-    for k, (before, after) in enumerate(zip(positions, positions[1:]), 1):
+    for k, (before, after) in enumerate(pairwise(positions), 1):
         if is_gradient and not piece.sets_positions and after < before:
             raise _bad_node(i, node, f"the colour map's position {k} is below the one before it")
 
@@ -250,7 +257,9 @@ def _verify_cycles(program: Program, own_draws: list[int]) -> None:
                 most[i] = open_
                 for child in reversed(children):
                     if most[child] == open_:
-                        raise _bad_node(child, program.nodes[child], "it contains itself without entering a symbol")
+                        raise _bad_node(
+                            child, program.nodes[child], "it contains itself without entering a symbol"
+                        )
                     if most[child] == unseen:
                         stack.append(child)
 

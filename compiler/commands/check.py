@@ -84,7 +84,8 @@ def _sentence(prediction) -> str:
         kinds = prediction.by_kind or {"primitive": prediction.primitives}
         counts = " and ".join(f"{_short(n)} {_plural(kind, n)}" for kind, n in kinds.items())
     states = "states not counted" if prediction.states is None else f"{prediction.states:,} states"
-    return f"{counts}, {states}, depth {prediction.depth:,}"
+    depth = "no end to its depth" if prediction.depth is None else f"depth {prediction.depth:,}"
+    return f"{counts}, {states}, {depth}"
 
 
 def _plural(kind: str, count: int) -> str:

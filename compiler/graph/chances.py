@@ -9,14 +9,14 @@ decides.
 
 from __future__ import annotations
 
-from typing import Sequence
+from collections.abc import Sequence
 
 from ..elementary import seed_key
+from ..reading.model import Assign
 from . import graph as g
 from .passes.liveness import live_sets, needed
 from .ranges import Range, Ranges, Value, Values
 from .states import Formula, State, seed_of
-from ..reading.model import Assign
 
 
 class Chances:
@@ -56,7 +56,10 @@ class Chances:
                     else:
                         ways = ((chance, node.then, True), (1 - chance, node.otherwise, False))
                         formula.picks.append(
-                            [(p, self._walk(to, self.ranges.refine(node.test, holds, values))) for p, to, holds in ways]
+                            [
+                                (p, self._walk(to, self.ranges.refine(node.test, holds, values)))
+                                for p, to, holds in ways
+                            ]
                         )
                 case g.Choose():
                     self._choose(node, values, formula, stack)
@@ -75,7 +78,9 @@ class Chances:
     def _calculate(self, index: int, node: g.Calculate, values: Values) -> Values:
         changed = dict(values)
         for statement in self.statements[index]:
-            changed[statement.parameter] = self.ranges.evaluate(statement.value, values if node.together else changed)
+            changed[statement.parameter] = self.ranges.evaluate(
+                statement.value, values if node.together else changed
+            )
         return changed
 
     def _choose(self, node: g.Choose, values: Values, formula: Formula, stack: list) -> None:

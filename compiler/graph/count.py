@@ -7,8 +7,8 @@ Example: in Figure 2.1 every state of the crown has 1 + 2·(primitives of the ne
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from decimal import Decimal, localcontext
-from typing import Callable
 
 from .explore import Exploration
 from .states import Formula, State

@@ -13,8 +13,8 @@ Example::
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Callable, Sequence
 
 from .. import elementary
 from ..elementary import CHOICE_STREAM, bits, mix, name_hash
@@ -22,6 +22,7 @@ from ..reading.model import Apply, Assign, Constant, Expression, Read
 from ..reading.source import Span
 from . import graph as g
 from .matrices import Matrix, is_finite, matrix_of
+from .rewrite import parts
 
 DRAWS_PER_APPLICATION = 64
 MAX_VARIANTS = 2**32
@@ -65,7 +66,9 @@ class Scope:
         """The next number in [0, 1) of a stream, given by its bits."""
         ordinal = self.drawn.get(stream, 0)
         if sum(self.drawn.values()) >= DRAWS_PER_APPLICATION:
-            raise EvaluationError("limit", f"more than {DRAWS_PER_APPLICATION} draws in one application", span)
+            raise EvaluationError(
+                "limit", f"more than {DRAWS_PER_APPLICATION} draws in one application", span
+            )
         self.drawn[stream] = ordinal + 1
         return elementary.rand(self.key, stream, ordinal)
 
@@ -159,7 +162,10 @@ def calculate(node: g.Calculate, scope: Scope) -> None:
 
 
 def _assign(statement: Assign, value: float, scope: Scope) -> None:
-    _require_finite(f"'{statement.parameter}'", value, statement, statement.value)
+    if not math.isfinite(value):
+        why = ": division by zero" if _divides_by_zero(statement.value, scope.copy()) else ""
+        message = f"'{statement.parameter}' becomes {_shown(value)}{why}"
+        raise EvaluationError("not-finite", message, statement.span)
     scope.values[statement.parameter] = value
 
 
@@ -210,10 +216,19 @@ def _sum(weights: list[float]) -> float:
     return total
 
 
-def _require_finite(what: str, value: float, place: object, expression: Expression | None = None) -> None:
-    if math.isfinite(value):
-        return
-    shown = "not a number" if math.isnan(value) else "infinite"
-    divides = isinstance(expression, Apply) and expression.operation in ("divide", "modulo")
-    reason = " (a division by zero?)" if divides else ""
-    raise EvaluationError("not-finite", f"{what} becomes {shown}{reason}", getattr(place, "span", None))
+def _require_finite(what: str, value: float, expression: Expression) -> None:
+    if not math.isfinite(value):
+        raise EvaluationError("not-finite", f"{what} is {_shown(value)}", expression.span)
+
+
+def _shown(value: float) -> str:
+    return "not a number" if math.isnan(value) else "infinite"
+
+
+def _divides_by_zero(expression: Expression, scope: Scope) -> bool:
+    """Whether a division in an expression is by zero, to explain its value (``scope`` is spent on it)."""
+    return any(
+        evaluate(part.arguments[1], scope) == 0
+        for part in parts(expression)
+        if isinstance(part, Apply) and part.operation in ("divide", "modulo")
+    )

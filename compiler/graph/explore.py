@@ -8,8 +8,8 @@ Example: for Figure 2.1 there are thirteen components of one state each, (0, 0, 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Callable, Iterable, Iterator
 
 from .states import Formula, State
 
@@ -32,7 +32,8 @@ class Exploration:
 def explore(
     starts: Iterable[State], expand: Callable[[State], Formula], max_states: int, max_depth: int
 ) -> Exploration:
-    """Every state that ``starts`` lead to, unless a limit stops the exploration."""
+    """Every state that ``starts`` lead to, unless a limit stops the exploration: so many states beside the path to
+    the one at hand, or so long a path."""
     found = Exploration()
     try:
         for start in starts:
@@ -53,7 +54,9 @@ def _search(
     path: list[tuple[State, Iterator[State]]] = []
 
     def visit(state: State) -> None:
-        for limit, reached in (("states", len(number) >= max_states), ("depth", len(path) >= max_depth)):
+        # States on the path itself don't count as many: one long recursion isn't an explosion.
+        beside = len(number) - len(path)
+        for limit, reached in (("depth", len(path) >= max_depth), ("states", beside >= max_states)):
             if reached:
                 found.limit, found.path = limit, [s for s, _ in path]
                 raise Stopped

@@ -12,7 +12,6 @@ Example::
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from decimal import Decimal
 
@@ -26,9 +25,10 @@ from .explore import Exploration, explore
 from .passes.liveness import draw_sets, live_sets
 from .states import Derivation, DerivationError, Formula, State, objects_of
 
-MAX_STATES = 100_000
+MAX_STATES = 50_000
 MAX_DEPTH = 100_000
 MAX_ERRORS = 20
+PROOF_STATES = 2000
 
 
 @dataclass
@@ -74,8 +74,13 @@ class _Forecaster:
         result.depth = self.depth(found, starts) if found.complete else None
         if found.complete and not depends:
             self.count_exactly(found, starts)
-        elif not endless:
-            self.count_chances()
+        else:
+            result.primitives, result.primitives_range, result.by_kind = None, (None, None, None), {}
+            if not endless:
+                # After a path without end seen, only a proof of it is worth looking for.
+                self.count_chances(
+                    min(self.max_states, PROOF_STATES) if found.limit == "depth" else self.max_states
+                )
         result.infinite = bool(found.cyclic) and not self.diagnostics.has_errors
         result.diagnostics = self.diagnostics.sorted()
         return result
@@ -116,7 +121,9 @@ class _Forecaster:
     def report_limit(self, found: Exploration) -> None:
         if found.limit == "depth":
             state = found.path[-1]
-            message = f"a path enters more than {self.max_depth:,} symbols{self.derivation.circumstances(state)}"
+            message = (
+                f"a path enters more than {self.max_depth:,} symbols{self.derivation.circumstances(state)}"
+            )
             hint = "the recursion seems to have no end: does a guard stop it?"
             self.tell("depth-limit", self.graph.nodes[state[0]].span, message, hint)
             return
@@ -166,13 +173,12 @@ class _Forecaster:
         result.by_kind = {kind: _total(count(found, kind, most), starts) for kind in self.kinds(found)}
         result.primitives_range = (result.primitives,) * 3
 
-    def count_chances(self) -> None:
+    def count_chances(self, max_states: int) -> None:
         """Bounds and, where they differ, the expectation."""
         result = self.result
-        result.primitives, result.primitives_range, result.by_kind = None, (None, None, None), {}
         bounds = Chances(self.graph, uniform=False)
         starts = self.starts(bounds)
-        found = explore(starts, bounds.expand, self.max_states, self.max_depth)
+        found = explore(starts, bounds.expand, max_states, self.max_depth)
         if not found.complete:
             return
         low, high = (_total(count(found, "", choose), starts) for choose in (least, most))

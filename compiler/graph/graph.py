@@ -16,8 +16,8 @@ statements stay symbolic (``reading.model``); the encoder makes code of them.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
-from typing import Iterator
 
 from ..reading.model import Assign, Expression, Mesh, Record, Step, TextureValue, Variants
 from ..reading.source import Span

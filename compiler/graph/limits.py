@@ -11,7 +11,7 @@ from __future__ import annotations
 from ..reading.diagnostics import Diagnostics
 from ..reading.model import Apply, Expression
 from . import graph as g
-from .passes.rewrite import expressions, fixpoint
+from .rewrite import expressions, fixpoint
 
 STACK = 64
 DRAWS_PER_APPLICATION = 64
@@ -21,7 +21,9 @@ def check_limits(graph: g.Graph, diagnostics: Diagnostics) -> None:
     _check_draws(graph, diagnostics)
     for node in graph.nodes:
         if node.span and _stack_of(node) > STACK:
-            diagnostics.add("limit", node.span, f"an expression here needs more than {STACK} values at a time")
+            diagnostics.add(
+                "limit", node.span, f"an expression here needs more than {STACK} values at a time"
+            )
 
 
 def _check_draws(graph: g.Graph, diagnostics: Diagnostics) -> None:
@@ -35,7 +37,9 @@ def _check_draws(graph: g.Graph, diagnostics: Diagnostics) -> None:
     for i, node in enumerate(graph.nodes):
         if isinstance(node, (g.Symbol, g.Object)) and node.span and most[i] > DRAWS_PER_APPLICATION:
             message = f"'{node.name}' draws up to {most[i]} times in one application, at most {DRAWS_PER_APPLICATION} are possible"
-            diagnostics.add("limit", node.span, message, "a reference to another Selection begins a new application")
+            diagnostics.add(
+                "limit", node.span, message, "a reference to another Selection begins a new application"
+            )
 
 
 def draw_count(expression: Expression) -> int:

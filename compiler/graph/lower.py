@@ -15,7 +15,7 @@ Example: ``object { Tree }`` with ``Tree -> cylinder;`` becomes ::
 
 from __future__ import annotations
 
-from typing import Callable
+from collections.abc import Callable
 
 from ..reading import model as m
 from . import graph as g

@@ -10,7 +10,7 @@ Example: ``matrix_of([("trans", (0, 0, 2)), ("rotz", (90,))])`` is
 from __future__ import annotations
 
 import math
-from typing import Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 from .. import elementary
 
@@ -44,6 +44,8 @@ def is_singular(m: Matrix) -> bool:
     det = determinant(m)
     if det == 0:
         return True
+    if 1e-50 < abs(det) and max(m) < 1e50 and min(m) > -1e50:
+        return False  # the inverse's entries stay below 1e200
     adjugate = (
         m[5] * m[10] - m[6] * m[9],
         m[2] * m[9] - m[1] * m[10],
@@ -66,10 +68,11 @@ def is_finite(m: Matrix) -> bool:
 
 def matrix_of(steps: Iterable[tuple[str, Sequence[float]]]) -> Matrix:
     """M = step0 · step1 · …, of (operation, numbers) pairs. ValueError for a rotation about a zero axis."""
-    matrix = IDENTITY
+    matrix = None
     for operation, numbers in steps:
-        matrix = multiply(matrix, STEPS[operation](*numbers))
-    return tuple(value + 0.0 for value in matrix)  # -0 becomes 0: bytecode has no -0
+        step = STEPS[operation](*numbers)
+        matrix = multiply(matrix, step) if matrix else step
+    return tuple([value + 0.0 for value in matrix or IDENTITY])  # -0 becomes 0: bytecode has no -0
 
 
 def _translation(x: float, y: float, z: float) -> Matrix:

@@ -55,7 +55,9 @@ def print_node(node: g.Node) -> str:
         case g.Branch():
             return f"branch ({print_expression(node.test)}) then {node.then} else {node.otherwise}"
         case g.Choose():
-            return "choose " + " | ".join(f"{print_expression(weight)}: {body}" for weight, body in node.cases)
+            return "choose " + " | ".join(
+                f"{print_expression(weight)}: {body}" for weight, body in node.cases
+            )
         case g.Calculate():
             together = " together" if node.together else ""
             return f"{_named('calculate', node.name)}{together} {{ {_statements(node)} }} -> {node.child}"
@@ -117,8 +119,14 @@ def print_number(value: float) -> str:
 
 def print_texture(texture: TextureValue) -> str:
     """``{ ambient 0.1 0.1 0.1; entry 0 0.45 0.3 0.15 0 0 }``"""
-    rows = [(name, values) for name, values in texture.values] + [("entry", entry) for entry in texture.entries]
-    return "{ " + "; ".join(" ".join([name, *(print_expression(v, ATOM) for v in values)]) for name, values in rows) + " }"
+    rows = [(name, values) for name, values in texture.values] + [
+        ("entry", entry) for entry in texture.entries
+    ]
+    return (
+        "{ "
+        + "; ".join(" ".join([name, *(print_expression(v, ATOM) for v in values)]) for name, values in rows)
+        + " }"
+    )
 
 
 def _statements(node: g.Calculate) -> str:

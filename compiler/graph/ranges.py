@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Sequence
+from typing import NamedTuple
 
 from .. import elementary
 from ..reading.model import Apply, Constant, Expression, Read
@@ -84,7 +85,11 @@ class Ranges:
         if operation == "rand":
             return DRAWN
         if not any(isinstance(argument, Range) for argument in arguments):
-            return elementary.hash(self.seed_key, *arguments) if operation == "hash" else apply(operation, arguments)
+            return (
+                elementary.hash(self.seed_key, *arguments)
+                if operation == "hash"
+                else apply(operation, arguments)
+            )
         return self._uniform(operation, arguments) if self.uniform else self._bounds(operation, arguments)
 
     def probability(self, test: Expression, values: Values) -> float:

@@ -9,15 +9,15 @@ Example: in Figure 2.1 the state (Tree, cntTree 3, cntTrunk 0, betaBr 32) has on
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
-from typing import Hashable, Iterator
 
 from ..elementary import seed_key
 from ..reading.source import Span
 from . import graph as g
 from .evaluate import EvaluationError, Scope, calculate, choose, evaluate, transform
 from .matrices import IDENTITY, Matrix, is_singular, multiply
-from .passes.rewrite import expressions
+from .rewrite import expressions
 
 State = Hashable
 
@@ -62,6 +62,7 @@ class Derivation:
         self.scopes: dict[State, Scope] = {}
         self.singular: dict[int, int] = {}  # node → subtrees dropped
         self.seed_key = seed_key(seed_of(graph))
+        self.children = [node.children() for node in graph.nodes]
 
     def start(self, node: int) -> Formula:
         """The formula of an object node. Primitives outside of symbols aren't counted."""
@@ -88,7 +89,9 @@ class Derivation:
             try:
                 following = self._step(index, scope, matrix, formula, edges)
             except EvaluationError as error:
-                raise DerivationError(error, self.graph.nodes[index].span, self.circumstances(state)) from None
+                raise DerivationError(
+                    error, self.graph.nodes[index].span, self.circumstances(state)
+                ) from None
             stack.extend(reversed(following))
         return formula
 
@@ -125,9 +128,11 @@ class Derivation:
                 formula.add(node.shape)
             case g.MeshLeaf():
                 formula.add("mesh")
-        return [(child, scope, matrix) for child in node.children()]
+        return [(child, scope, matrix) for child in self.children[index]]
 
-    def _enter(self, node: g.Enter, scope: Scope, matrix: Matrix, formula: Formula, edges: list | None) -> None:
+    def _enter(
+        self, node: g.Enter, scope: Scope, matrix: Matrix, formula: Formula, edges: list | None
+    ) -> None:
         symbol = self.graph.nodes[node.symbol]
         entered = scope.entered(symbol.name)
         live = tuple(entered.values.get(name) for name in symbol.live)

@@ -10,13 +10,13 @@ Example: a union of one term after ``merge`` raises
 from __future__ import annotations
 
 import math
-from typing import Callable, Iterable
+from collections.abc import Callable, Iterable
 
 from ..reading.model import Apply, Assign, Constant, Expression, Read, Step, Variants
 from . import graph as g
 from .matrices import STEPS
-from .passes.rewrite import expressions, parts
 from .printing import print_node
+from .rewrite import expressions, parts
 
 # How many arguments operations take. Steps and `hash` are apart.
 ARITY = {
@@ -48,8 +48,16 @@ class InvalidGraph(AssertionError):
 
 # Rows of (node class, rule in words, test of graph and node).
 RULES: tuple[tuple[type, str, Callable[[g.Graph, g.Node], bool]], ...] = (
-    (g.Node, "every child is a node of the graph", lambda graph, n: all(0 <= c < len(graph.nodes) for c in n.children())),
-    (g.Node, "every operation exists and has its arguments", lambda graph, n: all(map(_is_legal, expressions(n)))),
+    (
+        g.Node,
+        "every child is a node of the graph",
+        lambda graph, n: all(0 <= c < len(graph.nodes) for c in n.children()),
+    ),
+    (
+        g.Node,
+        "every operation exists and has its arguments",
+        lambda graph, n: all(map(_is_legal, expressions(n))),
+    ),
     (
         g.Node,
         "every parameter that is read or assigned has a slot",
@@ -65,7 +73,11 @@ RULES: tuple[tuple[type, str, Callable[[g.Graph, g.Node], bool]], ...] = (
     (g.Rule, "counts from 0", lambda graph, n: n.index >= 0),
     (g.Rule, "leads to an expression", lambda graph, n: _all(graph, n, BELOW_RULES)),
     (g.Union, "has two or more terms", lambda graph, n: len(n.children_) >= 2),
-    (g.Union, "joins expressions or objects", lambda graph, n: _all(graph, n, BELOW_RULES) or _all(graph, n, TOP)),
+    (
+        g.Union,
+        "joins expressions or objects",
+        lambda graph, n: _all(graph, n, BELOW_RULES) or _all(graph, n, TOP),
+    ),
     (g.Object, "leads to an expression", lambda graph, n: _all(graph, n, BELOW_RULES)),
     (
         g.Calculate,
@@ -80,10 +92,20 @@ RULES: tuple[tuple[type, str, Callable[[g.Graph, g.Node], bool]], ...] = (
     (
         g.Transform,
         "has twelve finite numbers",
-        lambda graph, n: len(n.matrix) == 12 and all(isinstance(v, float) and math.isfinite(v) for v in n.matrix),
+        lambda graph, n: (
+            len(n.matrix) == 12 and all(isinstance(v, float) and math.isfinite(v) for v in n.matrix)
+        ),
     ),
-    (g.TransformCode, "has known steps with their arguments", lambda graph, n: all(map(_is_legal_step, n.steps))),
-    (g.Primitive, "has a known shape with its arguments", lambda graph, n: SHAPE_ARGUMENTS.get(n.shape) == len(n.arguments)),
+    (
+        g.TransformCode,
+        "has known steps with their arguments",
+        lambda graph, n: all(map(_is_legal_step, n.steps)),
+    ),
+    (
+        g.Primitive,
+        "has a known shape with its arguments",
+        lambda graph, n: SHAPE_ARGUMENTS.get(n.shape) == len(n.arguments),
+    ),
     (g.MeshLeaf, "has a mesh", lambda graph, n: 0 <= n.mesh < len(graph.meshes)),
 )
 
@@ -103,7 +125,9 @@ def verify(graph: g.Graph, after: str) -> None:
 def _verify_root(graph: g.Graph, after: str) -> None:
     root = graph.nodes[0]
     if not isinstance(root, TOP) and not (isinstance(root, g.Union) and _all(graph, root, TOP)):
-        raise InvalidGraph(f"after {after}: 0 {print_node(root)}: the root is an object, a union of objects, or empty")
+        raise InvalidGraph(
+            f"after {after}: 0 {print_node(root)}: the root is an object, a union of objects, or empty"
+        )
 
 
 def _verify_cycles(graph: g.Graph, after: str) -> None:
@@ -154,7 +178,11 @@ def _is_legal(expression: Expression) -> bool:
 def _is_legal_part(part: Expression) -> bool:
     if isinstance(part, Apply):
         count = len(part.arguments)
-        return 1 <= count <= HASH_ARGUMENTS if part.operation == "hash" else ARGUMENTS.get(part.operation) == count
+        return (
+            1 <= count <= HASH_ARGUMENTS
+            if part.operation == "hash"
+            else ARGUMENTS.get(part.operation) == count
+        )
     return isinstance(part, Read) or (isinstance(part, Constant) and isinstance(part.value, (int, float)))
 
 

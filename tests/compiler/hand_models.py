@@ -52,7 +52,9 @@ def apply(operation: str, *arguments: Expression | float) -> Apply:
 
 
 def assign(**values: Expression | float) -> Calculate:
-    return Calculate("", tuple(Assign(name, number(value), SPAN) for name, value in values.items()), span=SPAN)
+    return Calculate(
+        "", tuple(Assign(name, number(value), SPAN) for name, value in values.items()), span=SPAN
+    )
 
 
 def calculation(name: str, **values: Expression | float) -> Calculate:
@@ -63,7 +65,9 @@ def transformation(name: str, *steps: tuple) -> Transform:
     return Transform(name, tuple(Step(op, tuple(map(number, values)), SPAN) for op, *values in steps), SPAN)
 
 
-def paint(name: str, red: Expression | float = 1, green: Expression | float = 1, blue: Expression | float = 1) -> Paint:
+def paint(
+    name: str, red: Expression | float = 1, green: Expression | float = 1, blue: Expression | float = 1
+) -> Paint:
     entry = tuple(map(number, (0, red, green, blue, 0, 0)))
     return Paint(name, TextureValue((), (entry,)), SPAN)
 

@@ -6,7 +6,7 @@ the bits of a transformation, but never what is derived, nor a random number.
 
 from __future__ import annotations
 
-from typing import Callable
+from collections.abc import Callable
 
 from ..graph import Graph
 from ..verify import verify

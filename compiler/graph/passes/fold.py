@@ -18,7 +18,7 @@ from ...reading.model import Apply, Constant, Expression
 from .. import graph as g
 from ..evaluate import apply
 from ..lower import constant_transform
-from .rewrite import map_expressions, redirect
+from ..rewrite import map_expressions, redirect
 
 
 def fold(graph: g.Graph) -> None:
@@ -67,7 +67,9 @@ def _fold_choice(graph: g.Graph, i: int, node: g.Choose, targets: dict[int, int]
         return  # an error that the derivation reports
     if len(possible) < len(node.cases):
         count = len(node.cases) - len(possible)
-        graph.left_out.append(g.LeftOut(f"{count} of {len(node.cases)} alternatives{_place(node)}", "weight 0"))
+        graph.left_out.append(
+            g.LeftOut(f"{count} of {len(node.cases)} alternatives{_place(node)}", "weight 0")
+        )
     node.cases = possible
     (weight, body) = possible[0]
     if len(possible) == 1 and isinstance(weight, Constant) and weight.value > 0:

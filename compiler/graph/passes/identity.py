@@ -17,8 +17,8 @@ from __future__ import annotations
 
 from .. import graph as g
 from ..matrices import IDENTITY
+from ..rewrite import redirect
 from .liveness import draw_sets, live_sets
-from .rewrite import redirect
 
 
 def identity(graph: g.Graph) -> None:
@@ -45,7 +45,9 @@ def _round(graph: g.Graph, keyed: list[bool]) -> bool:
                 changed = True
     for i in targets:
         if isinstance(graph.nodes[i], g.Transform):
-            graph.left_out.append(g.LeftOut(f"transformation {graph.nodes[i].name}".strip(), "it changes nothing"))
+            graph.left_out.append(
+                g.LeftOut(f"transformation {graph.nodes[i].name}".strip(), "it changes nothing")
+            )
     redirect(graph, targets)
     # What was passed over is out of reach, and mustn't be found again.
     for i in targets:

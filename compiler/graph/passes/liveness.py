@@ -14,11 +14,11 @@ ordinals of the draws after them. The analysis is the classic backward one (Aho,
 
 from __future__ import annotations
 
-from typing import Iterable
+from collections.abc import Iterable
 
 from ...reading.model import Assign, Expression, Variants
 from .. import graph as g
-from .rewrite import drawing_reads, draws, expressions, fixpoint, node_draws, reads
+from ..rewrite import drawing_reads, draws, expressions, fixpoint, node_draws, reads
 
 # What an analysis asks for: everything (colours too), the geometry, or only how many primitives there are.
 PURPOSES = ("everything", "geometry", "count")
@@ -73,7 +73,9 @@ def needed(
         below -= {statement.parameter for statement in node.statements}
     for statement in reversed(node.statements):
         value = value_of(statement)
-        matters = isinstance(statement, Variants) or statement.parameter in (after if node.together else below)
+        matters = isinstance(statement, Variants) or statement.parameter in (
+            after if node.together else below
+        )
         stays = matters or draws(value)
         if matters and isinstance(statement, Assign) and not node.together:
             below.discard(statement.parameter)
@@ -101,7 +103,9 @@ def draw_sets(graph: g.Graph, purpose: str, live: list[frozenset[str]]) -> list[
         # Per statement, what is live after it decides; a statement alone makes a node of its own for that.
         below = set(live[node.child])
         for statement in reversed(node.statements):
-            if draws(value_of(statement)) and (isinstance(statement, Variants) or statement.parameter in below):
+            if draws(value_of(statement)) and (
+                isinstance(statement, Variants) or statement.parameter in below
+            ):
                 return True
             if not node.together:
                 below = needed(g.Calculate("", (statement,), node.child), below, purpose)[1]

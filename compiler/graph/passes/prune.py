@@ -12,7 +12,7 @@ before ::                       after ::
 from __future__ import annotations
 
 from .. import graph as g
-from .rewrite import map_children
+from ..rewrite import map_children
 
 
 def prune(graph: g.Graph) -> None:

@@ -12,7 +12,7 @@ A texture that draws stays: its draws move the ordinals of those below.
 from __future__ import annotations
 
 from .. import graph as g
-from .rewrite import fixpoint, node_draws, redirect
+from ..rewrite import fixpoint, node_draws, redirect
 
 
 def unused_textures(graph: g.Graph) -> None:
@@ -29,5 +29,7 @@ def unused_textures(graph: g.Graph) -> None:
     for i, node in enumerate(graph.nodes):
         if isinstance(node, g.Texture) and not takes[node.child] and not node_draws(node):
             targets[i] = node.child
-            graph.left_out.append(g.LeftOut(f"texture {node.name}".strip(), "always replaced by another one below it"))
+            graph.left_out.append(
+                g.LeftOut(f"texture {node.name}".strip(), "always replaced by another one below it")
+            )
     redirect(graph, targets)

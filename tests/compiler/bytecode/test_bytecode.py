@@ -8,8 +8,23 @@ import zlib
 from pathlib import Path
 
 import numpy as np
+import plsys.runtime
 import pytest
-from hand_models import apply, assign, branch, chain, choose, model, number, paint, read, rule, transformation, tree, union
+from hand_models import (
+    apply,
+    assign,
+    branch,
+    chain,
+    choose,
+    model,
+    number,
+    paint,
+    read,
+    rule,
+    transformation,
+    tree,
+    union,
+)
 from plsys.compiler.bytecode.decode import decode
 from plsys.compiler.bytecode.disassemble import disassemble, number_text
 from plsys.compiler.bytecode.encode import encode
@@ -17,21 +32,47 @@ from plsys.compiler.bytecode.reader import BytecodeError
 from plsys.compiler.graph import graph as g
 from plsys.compiler.pipeline import build_graph
 from plsys.compiler.reading.diagnostics import PlsysError
-from plsys.compiler.reading.model import Calculate, Empty, Enter, Mesh, MeshLeaf, NoShadow, Paint, Primitive, TextureValue, Variants
+from plsys.compiler.reading.model import (
+    Calculate,
+    Empty,
+    Enter,
+    Mesh,
+    MeshLeaf,
+    NoShadow,
+    Paint,
+    Primitive,
+    TextureValue,
+    Variants,
+)
 
-RUNTIME = Path(__file__).parents[3] / "runtime"
+LIBRARY = Path(plsys.runtime.__file__).with_name("libplsys.so")
 
 
 def everything() -> g.Graph:
     """A graph with every node kind and most opcodes."""
     n = read("n")
-    test = apply("or", apply("and", apply("greater", n, 0), apply("not", n)), apply("select", n, apply("hash", n, 2, 3), -1))
+    test = apply(
+        "or",
+        apply("and", apply("greater", n, 0), apply("not", n)),
+        apply("select", n, apply("hash", n, 2, 3), -1),
+    )
     gradient = TextureValue(
         (("pattern", (number(2),)), ("direction", (number(0), number(0), number(1))), ("diffuse", (n,))),
-        (tuple(map(number, (0, 1, 0, 0, 0, 0))), (number(1), apply("rand", n), *map(number, (0.5, 0, 0, 0.25)))),
+        (
+            tuple(map(number, (0, 1, 0, 0, 0, 0))),
+            (number(1), apply("rand", n), *map(number, (0.5, 0, 0, 0.25))),
+        ),
     )
     alternatives = choose(
-        (3, rule(0, union(chain(transformation("T", ("roty", n), ("scale_uniform", 0.5)), Enter("A")), MeshLeaf(0)))),
+        (
+            3,
+            rule(
+                0,
+                union(
+                    chain(transformation("T", ("roty", n), ("scale_uniform", 0.5)), Enter("A")), MeshLeaf(0)
+                ),
+            ),
+        ),
         (n, rule(1, chain(Paint("P", gradient), NoShadow(), Primitive("cone", (apply("sin", n),))))),
     )
     down = Calculate("C", (*assign(n=apply("subtract", n, 1)).statements, Variants(number(4))))
@@ -69,7 +110,16 @@ def test_every_construct_is_read_back():
     program = decode(encode(graph))
     names = [node.row.name for node in program.nodes]
     assert len(names) == len(graph.nodes)
-    assert {"symbol", "rule", "branch", "choose", "calculate", "transform", "transform_code", "texture"} < set(names)
+    assert {
+        "symbol",
+        "rule",
+        "branch",
+        "choose",
+        "calculate",
+        "transform",
+        "transform_code",
+        "texture",
+    } < set(names)
     assert {"union", "enter", "primitive", "mesh", "object", "no_shadow", "empty"} < set(names)
     symbol = program.nodes[names.index("symbol")]
     assert program.strings[symbol.fields["name"]] == "A" and symbol.fields["draws"] == 1
@@ -92,15 +142,21 @@ def test_places_are_those_of_the_source():
 def test_equal_code_and_equal_textures_stand_once():
     turn = transformation("T", ("rotz", read("n")))
     red = chain(paint("Red", 1, 0, 0), turn, Primitive("box"))
-    program = decode(encode(build_graph(model([chain(assign(n=1), Enter("A"))], A=rule(0, union(red, red, red))))))
+    program = decode(
+        encode(build_graph(model([chain(assign(n=1), Enter("A"))], A=rule(0, union(red, red, red)))))
+    )
     assert len(program.pieces) == 2 and len(program.records) == 2
 
 
 def test_minus_zero_and_what_is_not_finite_are_calculated():
-    scene = model([chain(assign(a=-0.0, b=float("inf"), c=float("nan")), Enter("A"))], A=rule(0, Primitive("box")))
+    scene = model(
+        [chain(assign(a=-0.0, b=float("inf"), c=float("nan")), Enter("A"))], A=rule(0, Primitive("box"))
+    )
     graph = build_graph(scene)
     graph.parameters = ["a", "b", "c"]
-    graph.nodes[0].child = graph.add(g.Calculate("", scene.objects[0].body.operator.statements, graph.nodes[0].child))
+    graph.nodes[0].child = graph.add(
+        g.Calculate("", scene.objects[0].body.operator.statements, graph.nodes[0].child)
+    )
     text = disassemble(encode(graph))
     assert "const 0\n        2  negate\n        3  store a" in text
     assert "const 1\n        7  const 0\n        9  divide\n       10  store b" in text
@@ -110,7 +166,9 @@ def test_an_expression_that_needs_too_many_values_is_refused():
     deep = read("n")
     for _ in range(64):
         deep = apply("add", 1, deep)
-    scene = model([chain(assign(n=0), assign(n=deep), Enter("A"))], A=rule(0, Primitive("cone", (read("n"),))))
+    scene = model(
+        [chain(assign(n=0), assign(n=deep), Enter("A"))], A=rule(0, Primitive("cone", (read("n"),)))
+    )
     with pytest.raises(PlsysError, match="hand.plsys:1:1: an expression needs more than 64 values"):
         encode(build_graph(scene))
 
@@ -157,7 +215,9 @@ def test_what_follows_the_end_is_refused():
     assert refuses(data + b"\0") and refuses(repaired(data + b"\0"))
 
 
-@pytest.mark.parametrize(("data", "reason"), [(b"", "isn't plsys bytecode"), (b"PLSB", "truncated"), (b"\x89PNG", "isn't plsys")])
+@pytest.mark.parametrize(
+    ("data", "reason"), [(b"", "isn't plsys bytecode"), (b"PLSB", "truncated"), (b"\x89PNG", "isn't plsys")]
+)
 def test_other_files_are_told_from_bytecode(data, reason):
     with pytest.raises(BytecodeError, match=reason):
         decode(data)
@@ -175,20 +235,56 @@ def test_the_disassembly_shows_nodes_code_and_places():
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.1, "0.1"), (1 / 3, "0.3333333333333333"), (-0.0, "0"), (1e300, "1e+300"), (2.0**53 + 2, "9007199254740994")],
+    [
+        (0.1, "0.1"),
+        (1 / 3, "0.3333333333333333"),
+        (-0.0, "0"),
+        (1e300, "1e+300"),
+        (2.0**53 + 2, "9007199254740994"),
+    ],
 )
 def test_numbers_are_the_shortest_that_read_back(value, text):
     assert number_text(value) == text
 
 
-def test_the_runtime_disassembles_alike(tmp_path):
-    library = RUNTIME / "libplsys.so"
-    if not library.exists():
+# --- beside the runtime
+
+
+@pytest.fixture(scope="module")
+def runtime_text():
+    """The runtime's disassembly of bytes, or None where it refuses them."""
+    if not LIBRARY.exists():
         pytest.skip("libplsys.so isn't built")
-    runtime = ctypes.CDLL(str(library))
-    runtime.pl_disassemble.restype = ctypes.c_void_p
+    library = ctypes.CDLL(str(LIBRARY))
+    library.pl_disassemble.restype = ctypes.c_void_p
+
+    def text(data: bytes) -> str | None:
+        pointer = library.pl_disassemble(data, ctypes.c_size_t(len(data)), None)
+        if not pointer:
+            return None
+        found = ctypes.string_at(pointer).decode()
+        library.pl_free(ctypes.c_void_p(pointer))
+        return found
+
+    return text
+
+
+def text_or_none(data: bytes) -> str | None:
+    try:
+        return disassemble(data)
+    except BytecodeError:
+        return None
+
+
+def test_the_runtime_disassembles_alike(runtime_text):
     for graph in (everything(), build_graph(tree())):
         data = encode(graph)
-        pointer = runtime.pl_disassemble(data, ctypes.c_size_t(len(data)), None)
-        assert pointer and ctypes.string_at(pointer).decode() == disassemble(data)
-        runtime.pl_free(ctypes.c_void_p(pointer))
+        assert runtime_text(data) == disassemble(data)
+
+
+@pytest.mark.parametrize("bit", [1, 4, 64])
+def test_the_runtime_refuses_the_same_changes(runtime_text, bit):
+    data = encode(everything())
+    for i in range(28, len(data)):
+        changed = repaired(data[:i] + bytes([data[i] ^ bit]) + data[i + 1 :])
+        assert runtime_text(changed) == text_or_none(changed), f"byte {i}"

@@ -8,7 +8,16 @@ import pytest
 from hand_models import apply, assign, choose, read, rule, transformation
 from plsys.compiler import elementary
 from plsys.compiler.graph import graph as g
-from plsys.compiler.graph.evaluate import EvaluationError, Scope, calculate, choose as choose_case, evaluate, transform
+from plsys.compiler.graph.evaluate import (
+    EvaluationError,
+    Scope,
+    calculate,
+    evaluate,
+    transform,
+)
+from plsys.compiler.graph.evaluate import (
+    choose as choose_case,
+)
 from plsys.compiler.reading.model import Assign, Constant, Empty, Variants
 
 
@@ -102,9 +111,13 @@ def test_errors(statement, code):
 
 def test_transformations_report_what_has_no_matrix():
     with pytest.raises(EvaluationError, match="axis"):
-        transform(g.TransformCode("T", transformation("T", ("rot", 30, read("a"), 0, 0)).steps, 0), scope(a=0.0))
+        transform(
+            g.TransformCode("T", transformation("T", ("rot", 30, read("a"), 0, 0)).steps, 0), scope(a=0.0)
+        )
     with pytest.raises(EvaluationError, match="isn't finite"):
-        transform(g.TransformCode("T", transformation("T", ("scale_uniform", apply("exp", 1e4))).steps, 0), scope())
+        transform(
+            g.TransformCode("T", transformation("T", ("scale_uniform", apply("exp", 1e4))).steps, 0), scope()
+        )
 
 
 def test_weights_decide_how_often():

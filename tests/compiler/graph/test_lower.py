@@ -3,10 +3,25 @@
 from __future__ import annotations
 
 import pytest
-from hand_models import SPAN, apply, assign, branch, chain, choose, model, paint, read, rule, transformation, tree, union
+from hand_models import (
+    SPAN,
+    apply,
+    assign,
+    branch,
+    chain,
+    choose,
+    model,
+    paint,
+    read,
+    rule,
+    transformation,
+    tree,
+    union,
+)
 from plsys.compiler.bytecode.layout_rows import LIMITS, OPCODES, SHAPES
 from plsys.compiler.graph import graph as g
-from plsys.compiler.graph import limits, verify as verifier
+from plsys.compiler.graph import limits
+from plsys.compiler.graph import verify as verifier
 from plsys.compiler.graph.lower import lower
 from plsys.compiler.graph.matrices import determinant, is_singular, matrix_of
 from plsys.compiler.graph.printing import print_expression
@@ -49,7 +64,9 @@ def test_figure_2_1_becomes_the_graph_of_figure_2_2():
 
 
 def test_several_objects_stand_under_one_union():
-    scene = model([Enter("A"), chain(NoShadow(), paint("P"), Primitive("box")), Enter("A")], A=rule(0, Empty()))
+    scene = model(
+        [Enter("A"), chain(NoShadow(), paint("P"), Primitive("box")), Enter("A")], A=rule(0, Empty())
+    )
     graph = lower(scene)
     verify(graph, "lower")
     assert [str(graph).splitlines()[i] for i in graph.nodes[0].children_] == [
@@ -190,10 +207,15 @@ def test_limits_are_the_bytecodes():
 
 def test_too_many_draws_in_one_application():
     def scene(count):
-        return model([Enter("A")], A=choose((1, rule(0, chain(assign(n=draws(count)), Enter("A")))), (1, rule(1, Empty()))))
+        return model(
+            [Enter("A")],
+            A=choose((1, rule(0, chain(assign(n=draws(count)), Enter("A")))), (1, rule(1, Empty()))),
+        )
 
     assert messages(scene(63)) == []
-    assert messages(scene(64)) == ["limit: 'A' draws up to 65 times in one application, at most 64 are possible"]
+    assert messages(scene(64)) == [
+        "limit: 'A' draws up to 65 times in one application, at most 64 are possible"
+    ]
 
 
 def test_too_many_values_at_a_time():
@@ -201,7 +223,9 @@ def test_too_many_values_at_a_time():
         expression = read("n")
         for _ in range(depth - 1):
             expression = apply("add", 1, expression)
-        return model([chain(assign(n=0), assign(n=expression), Enter("A"))], A=rule(0, union(Empty(), Empty(SPAN))))
+        return model(
+            [chain(assign(n=0), assign(n=expression), Enter("A"))], A=rule(0, union(Empty(), Empty(SPAN)))
+        )
 
     assert messages(nested(64)) == []
     assert messages(nested(65)) == ["limit: an expression here needs more than 64 values at a time"]

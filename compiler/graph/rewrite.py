@@ -1,4 +1,4 @@
-"""What passes share: sending references elsewhere, walking expressions, telling what draws.
+"""What passes and analyses share: sending references elsewhere, walking expressions, telling what draws.
 
 Example: ``redirect(graph, {4: 7})`` makes every edge to node 4 one to node 7 (and one to 7 stays, unless 7 is
 redirected too).
@@ -6,11 +6,11 @@ redirected too).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from copy import copy
-from typing import Callable, Iterator
 
-from ...reading.model import Apply, Assign, Expression, Read, Step, TextureValue
-from .. import graph as g
+from ..reading.model import Apply, Assign, Expression, Read, Step, TextureValue
+from . import graph as g
 
 CHILD_FIELDS = ("child", "body", "then", "otherwise", "symbol")
 
@@ -129,9 +129,11 @@ def drawing_reads(expression: Expression) -> set[str]:
     found: set[str] = set()
     for argument in expression.arguments:
         found |= drawing_reads(argument)
-    if expression.operation == "rand":
-        found |= reads(expression.arguments[0])
-    elif expression.operation in ("and", "or", "select") and any(map(draws, expression.arguments[1:])):
+    if (
+        expression.operation == "rand"
+        or expression.operation in ("and", "or", "select")
+        and any(map(draws, expression.arguments[1:]))
+    ):
         found |= reads(expression.arguments[0])
     return found
 
