@@ -1,15 +1,15 @@
 """Draw a scene here and in POV-Ray, and compare the pictures pixel by pixel.
 
-POV-Ray 3.7 draws the exported scene in linear light, 16 bits, without antialiasing; plsys takes POV-Ray's tolerances
-for hits and shadows. Every pixel that differs by more than 1e-5 is traced again in higher precision, to say who is
-right: ours_wrong, theirs_wrong, or ambiguous (rounding alone decides: edges of things, of shadows and of patterns).
+POV-Ray 3.7 draws the exported scene in linear light, 16 bits, without antialiasing; plsys takes POV-Ray's
+tolerances for hits and shadows. Every pixel that differs by more than 1e-5 is traced again in higher
+precision, to say who is right: ours_wrong, theirs_wrong, or ambiguous (rounding alone decides: edges of
+things, of shadows and of patterns).
 
-With --through obj the scene goes through a mesh file instead: written, read back, its volume and bounds checked against
-closed forms, and drawn.
+With --through obj the scene goes through a mesh file instead: written, read back, its volume and bounds
+checked against closed forms, and drawn.
 
-Exit code 0: at most 1 pixel in 10,000 differs by more than 1e-5, none of them visibly and away from an edge, and ours is
-never wrong. 1: otherwise. 2: no comparison is possible.
-"""
+Exit code 0: at most 1 pixel in 10,000 differs by more than 1e-5, none of them visibly and away from an edge,
+and ours is never wrong. 1: otherwise. 2: no comparison is possible."""
 
 from __future__ import annotations
 
@@ -30,12 +30,22 @@ CHANNELS = ("color", "depth", "normal", "primitive")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_scene_arguments(parser)
-    parser.add_argument("--size", type=size, default=(640, 480), metavar="WxH", help="in pixels (default 640x480)")
-    parser.add_argument("-o", dest="output", metavar="OUT.png", help="ours, theirs and the difference, side by side")
-    parser.add_argument("--amplify", type=float, default=None, metavar="F", help="factor of the difference picture")
-    parser.add_argument("--through", choices=("obj",), help="compare with the scene's mesh export instead of POV-Ray")
+    parser.add_argument(
+        "--size", type=size, default=(640, 480), metavar="WxH", help="in pixels (default 640x480)"
+    )
+    parser.add_argument(
+        "-o", dest="output", metavar="OUT.png", help="ours, theirs and the difference, side by side"
+    )
+    parser.add_argument(
+        "--amplify", type=float, default=None, metavar="F", help="factor of the difference picture"
+    )
+    parser.add_argument(
+        "--through", choices=("obj",), help="compare with the scene's mesh export instead of POV-Ray"
+    )
     parser.add_argument("--tolerance", type=float, metavar="UNITS", help="of the mesh, in scene units")
-    parser.add_argument("--accel", choices=("auto", "none", "boxes", "bvh"), default="auto", help="accelerator")
+    parser.add_argument(
+        "--accel", choices=("auto", "none", "boxes", "bvh"), default="auto", help="accelerator"
+    )
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="default: one a core")
 
 
@@ -70,7 +80,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def render_ours(data: bytes, arguments: argparse.Namespace):
-    """(channels, agrees, scene): our picture with POV-Ray's tolerances, a test of single rays, and the open scene."""
+    """(channels, agrees, scene): our picture with POV-Ray's tolerances, a test of single rays, and the open
+    scene."""
     from ...runtime import Scene
 
     scene = Scene(data, accelerator=arguments.accel, threads=arguments.threads or None, povray_epsilon=True)
@@ -167,9 +178,9 @@ def text(facts: dict) -> str:
     if mesh := facts.get("mesh"):
         lines += [
             f"  {mesh['triangles']:,} triangles, at most {mesh['error']:.3g} from the surfaces "
-            f"(tolerance {mesh['tolerance']:.3g}){', watertight' if mesh['watertight'] else ', NOT WATERTIGHT'}",
-            f"  volume {mesh['volume']:.9g} (its facets' {mesh['facets_volume']:.9g}, the scene's {mesh['exact_volume']:.9g}); "
-            f"bounds off by {mesh['bounds_error']:.3g}",
+            f"(tolerance {mesh['tolerance']:.3g}), {'' if mesh['watertight'] else 'NOT '}watertight",
+            f"  volume {mesh['volume']:.9g} (its facets' {mesh['facets_volume']:.9g}, "
+            f"the scene's {mesh['exact_volume']:.9g}); bounds off by {mesh['bounds_error']:.3g}",
             *(f"  not carried: {line}" for line in facts["lost"]),
             "  the mesh is the scene" if facts["passed"] else "  THE MESH ISN'T THE SCENE",
         ]

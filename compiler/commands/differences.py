@@ -1,8 +1,9 @@
-"""Two pictures of one scene, compared: statistics, edges, every differing pixel traced again, and a picture of it all.
+"""Two pictures of one scene, compared: statistics, edges, every differing pixel traced again, and a picture
+of it all.
 
-Ours is what the runtime draws, theirs POV-Ray's 16-bit picture; both are linear light, (height, width, 3) float32.
-Statistics are OpenImageIO's; edges are those of our geometry: another primitive, a normal turned by more than
-10°, or a depth that jumps by more than 1 % in a pixel's 3×3 neighbourhood.
+Ours is what the runtime draws, theirs POV-Ray's 16-bit picture; both are linear light, (height, width, 3)
+float32. Statistics are OpenImageIO's; edges are those of our geometry: another primitive, a normal turned by
+more than 10°, or a depth that jumps by more than 1 % in a pixel's 3×3 neighbourhood.
 
 Example: ``statistics(ours, theirs, edges)["max_abs"]`` is 7.6e-6 where only quantisation differs.
 """
@@ -23,12 +24,13 @@ MOST_RETRACED = 2000
 STEP = 1e-6  # of a pixel: how far the neighbours of a ray are that rounding may confuse it with
 
 CLASSES = ("ours_wrong", "theirs_wrong", "ambiguous", "sampling", "unclassified")
-"""``sampling`` is for pictures with several samples a pixel; both pictures here have one, at the same place."""
+"""``sampling`` is for pictures with several samples a pixel; both pictures here have one, at the same
+place."""
 
 
 def clipped(color: np.ndarray) -> np.ndarray:
-    """As far as a 16-bit picture can show it. Not rounded to 16 bits as theirs is: a value that rounds up here and down
-    there would count as 1.5e-5, twice what quantisation can do."""
+    """As far as a 16-bit picture can show it. Not rounded to 16 bits as theirs is: a value that rounds up
+    here and down there would count as 1.5e-5, twice what quantisation can do."""
     return np.clip(color, 0, 1).astype(np.float32)
 
 
@@ -66,11 +68,12 @@ def statistics(ours: np.ndarray, theirs: np.ndarray, edge: np.ndarray) -> dict:
     }
 
 
-# --- every differing pixel --------------------------------------------------------------------------------------------
+# --- every differing pixel ---
 
 
 class Camera:
-    """POV-Ray's perspective camera (see runtime/SHADING.md and POV-Ray's manual): pixel coordinates to rays."""
+    """POV-Ray's perspective camera (see runtime/SHADING.md and POV-Ray's manual): pixel coordinates to
+    rays."""
 
     def __init__(self, values: dict[str, tuple[float, ...]], width: int, height: int) -> None:
         location, direction, right, up, sky, look_at = (
@@ -106,8 +109,8 @@ def _unit(v: np.ndarray) -> np.ndarray:
 def classify(
     pixels: np.ndarray, retracer: Retracer, camera: Camera, agrees: Callable[[object], bool]
 ) -> list[dict[str, object]]:
-    """What each differing pixel (row, column) is: ``{x, y, class, why}``. ``agrees(ray)`` tells whether the runtime
-    decides a ray as the retracer does."""
+    """What each differing pixel (row, column) is: ``{x, y, class, why}``. ``agrees(ray)`` tells whether the
+    runtime decides a ray as the retracer does."""
     angle = 2 * np.pi * np.arange(8) / 8
     dx, dy = (np.concatenate([[0.0], STEP * f(angle)]) for f in (np.cos, np.sin))
     found = []
@@ -120,11 +123,14 @@ def classify(
         else:
             kind, why = "ours_wrong", "a ray hits something else in higher precision"
         found.append({"x": column, "y": row, "class": kind, "why": why})
-    found += [{"x": x, "y": y, "class": "unclassified", "why": "too many"} for y, x in pixels[MOST_RETRACED:].tolist()]
+    found += [
+        {"x": x, "y": y, "class": "unclassified", "why": "too many"}
+        for y, x in pixels[MOST_RETRACED:].tolist()
+    ]
     return found
 
 
-# --- side by side --------------------------------------------------------------------------------------------------------
+# --- side by side ---
 
 
 def write_side_by_side(
@@ -143,5 +149,7 @@ def write_side_by_side(
         sheet[band:, i * (width + gap) : i * (width + gap) + width] = panel
     picture = oiio.ImageBuf(np.ascontiguousarray(sheet))
     for i, caption in enumerate(("plsys", their_name, f"|difference| x {factor:g}")):
-        oiio.ImageBufAlgo.render_text(picture, i * (width + gap) + 8, 17, caption, 14, textcolor=(0.9, 0.9, 0.9))
+        oiio.ImageBufAlgo.render_text(
+            picture, i * (width + gap) + 8, 17, caption, 14, textcolor=(0.9, 0.9, 0.9)
+        )
     write_picture(path, picture.get_pixels(oiio.FLOAT), metadata={"Software": "plsys"})

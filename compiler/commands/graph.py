@@ -1,8 +1,7 @@
 """Draw a scene's cyclic object-instancing graph: S, C, T, + and P nodes, with its cycles.
 
-S is a Selection, C a Calculation, T a Transformation, + a union, P a primitive and X a texture; guards stand on the
-edges, and edges that close a cycle are led around in colour. A .dot file is text for Graphviz.
-"""
+S is a Selection, C a Calculation, T a Transformation, + a union, P a primitive and X a texture; guards stand
+on the edges, and edges that close a cycle are led around in colour. A .dot file is text for Graphviz."""
 
 from __future__ import annotations
 

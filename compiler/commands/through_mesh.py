@@ -1,8 +1,8 @@
 """``compare --through obj``: a scene, through a mesh file and back.
 
-The file is read with trimesh, its volume and bounds are checked against closed forms of the exact scene, and it is
-drawn beside the scene itself; what the file can't carry (planes, camera, lights) is taken from the scene.
-"""
+The file is read with trimesh, its volume and bounds are checked against closed forms of the exact scene, and
+it is drawn beside the scene itself; what the file can't carry (planes, camera, lights) is taken from the
+scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from .common import build_scene
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Exit code 1 unless volume, bounds and watertightness are as promised; the pictures only show where facets do."""
+    """Exit code 1 unless volume, bounds and watertightness are as promised; the pictures only show where
+    facets do."""
     import numpy as np
 
     from ..bytecode.encode import encode

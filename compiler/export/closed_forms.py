@@ -1,6 +1,7 @@
 """Exact volumes and bounds of transformed primitives.
 
-What an export is checked against: no tessellation and no sampling, only the support functions of the unit shapes.
+What an export is checked against: no tessellation and no sampling, only the support functions of the unit
+shapes.
 
 Example: the unit sphere under diag(1, 1, 2) has volume 8π/3 and bounds (-1, -1, -2) to (1, 1, 2).
 """
@@ -60,7 +61,9 @@ def _bounds(name: str, m: np.ndarray, argument: np.ndarray, meshes: list[Mesh]):
             return np.minimum(origin, origin + z) - circle, np.maximum(origin, origin + z) + circle
         case "cone":
             top = radius * circle
-            return np.minimum(origin - circle, origin + z - top), np.maximum(origin + circle, origin + z + top)
+            return np.minimum(origin - circle, origin + z - top), np.maximum(
+                origin + circle, origin + z + top
+            )
         case "mesh":
             boxes = [apply(m[i : i + 1], meshes[int(a)].vertices)[0] for i, a in enumerate(argument)]
             return np.array([b.min(axis=0) for b in boxes]), np.array([b.max(axis=0) for b in boxes])

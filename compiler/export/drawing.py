@@ -1,11 +1,11 @@
 """A graph → what there is to draw of it: the paper's Figure 2.2.
 
-Every S-, C-, T-, +- and P-node (and X for textures) is a circle with its letter; what the compiler needs between
-them (rules, guards, references) becomes edges and their labels. References back to a symbol that is being derived are
-the cycles; :func:`diagram` marks them.
+Every S-, C-, T-, +- and P-node (and X for textures) is a circle with its letter; what the compiler needs
+between them (rules, guards, references) becomes edges and their labels. References back to a symbol that is
+being derived are the cycles; :func:`diagram` marks them.
 
-Example: ``diagram(graph).edges[0]`` is ``Edge(0, 1, label="", is_back=False)``; ``dot(diagram(graph))`` is Graphviz text.
-"""
+Example: ``diagram(graph).edges[0]`` is ``Edge(0, 1, label="", is_back=False)``; ``dot(diagram(graph))`` is
+Graphviz text."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ class Node:
 
 @dataclass
 class Edge:
-    """From ``source`` to ``target`` (indices of nodes); ``label`` is a guard or a weight. ``is_back`` closes a cycle."""
+    """From ``source`` to ``target`` (indices of nodes); ``label`` is a guard or a weight. ``is_back`` closes
+    a cycle."""
 
     source: int
     target: int
@@ -151,7 +152,10 @@ def _mark_cycles(picture: Diagram) -> None:
 
 def dot(picture: Diagram, name: str = "plsys") -> str:
     """Graphviz' language, for those who want to lay it out themselves."""
-    lines = [f"digraph {_quoted(name)} {{", "  node [shape=circle fontname=Helvetica width=0.4 fixedsize=true]"]
+    lines = [
+        f"digraph {_quoted(name)} {{",
+        "  node [shape=circle fontname=Helvetica width=0.4 fixedsize=true]",
+    ]
     lines.append("  edge [fontname=Helvetica fontsize=10]")
     for index, node in enumerate(picture.nodes):
         if node.letter:
@@ -161,7 +165,9 @@ def dot(picture: Diagram, name: str = "plsys") -> str:
     for edge in picture.edges:
         attributes = [f"label={_quoted(edge.label)}"] if edge.label else []
         attributes += ["constraint=false style=dashed"] if edge.is_back else []
-        lines.append(f"  n{edge.source} -> n{edge.target}" + (f" [{' '.join(attributes)}]" if attributes else ""))
+        lines.append(
+            f"  n{edge.source} -> n{edge.target}" + (f" [{' '.join(attributes)}]" if attributes else "")
+        )
     return "\n".join([*lines, "}"]) + "\n"
 
 

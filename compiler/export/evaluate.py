@@ -1,8 +1,9 @@
 """Expressions over many instances at once.
 
 A :class:`Scope` is what expressions see of n instances: their parameters, random keys and the draws of their
-current application. ``evaluate(expression, scope)`` gives n doubles. Everything here is NumPy; the only functions
-shared with the runtime are those of ``plsys.compiler.elementary``, because an ulp in a guard is another plant.
+current application. ``evaluate(expression, scope)`` gives n doubles. Everything here is NumPy; the only
+functions shared with the runtime are those of ``plsys.compiler.elementary``, because an ulp in a guard is
+another plant.
 
 Example: with ``betaBr`` 60 in the first instance and 56 in the second, ``betaBr - 4.0`` gives
 ``array([56., 52.])``.
@@ -142,7 +143,9 @@ def draw(scope: Scope, rows: np.ndarray, stream: np.ndarray, origin: object) -> 
     """One draw for each of ``rows`` from the streams whose bits are ``stream``: uniform in [0, 1)."""
     drawn = scope.draws[rows]
     if len(rows) and (drawn != NO_DRAW).sum(axis=1).max(initial=0) >= DRAWS_PER_APPLICATION:
-        raise PlsysError(f"more than {DRAWS_PER_APPLICATION} draws in one application of a rule", place(origin))
+        raise PlsysError(
+            f"more than {DRAWS_PER_APPLICATION} draws in one application of a rule", place(origin)
+        )
     ordinal = (drawn == stream[:, None]).sum(axis=1).astype(np.uint64)
     column = np.full((len(scope), 1), NO_DRAW)
     column[rows, 0] = stream
@@ -151,7 +154,8 @@ def draw(scope: Scope, rows: np.ndarray, stream: np.ndarray, origin: object) -> 
 
 
 def execute(statements: tuple[Assign | Variants, ...], together: bool, name: str, scope: Scope) -> None:
-    """Runs a Calculation on ``scope``. With ``together`` every value is evaluated before the first is assigned."""
+    """Runs a Calculation on ``scope``. With ``together`` every value is evaluated before the first is
+    assigned."""
     parameters = scope.parameters.copy()
     if not together:
         scope.parameters = parameters

@@ -1,8 +1,9 @@
-"""Where rays meet unit shapes, in extended precision (NumPy's longdouble): slow, plain, and independent of the runtime.
+"""Where rays meet unit shapes, in extended precision (NumPy's longdouble): slow, plain, and independent of
+the runtime.
 
-For deciding who is right where two pictures differ. A function a shape takes origins and directions (..., 3) in the
-shape's own space and its argument, and gives all roots as (roots, ...) arrays, NaN where there is none; the same part of a
-surface (side, cap, face) always has the same place among the roots.
+For deciding who is right where two pictures differ. A function a shape takes origins and directions (..., 3)
+in the shape's own space and its argument, and gives all roots as (roots, ...) arrays, NaN where there is
+none; the same part of a surface (side, cap, face) always has the same place among the roots.
 
 Example: ``ROOTS["sphere"](o, d, 0.0)`` for o = (0, 0, -3), d = (0, 0, 1) is [2, 4].
 """
@@ -41,7 +42,9 @@ def cone(o, d, top):
     radius, slope = 1 + k * o[..., 2], k * d[..., 2]
     xy_o, xy_d = o[..., :2], d[..., :2]
     roots = _quadratic(
-        _dot(xy_d, xy_d) - slope * slope, _dot(xy_o, xy_d) - radius * slope, _dot(xy_o, xy_o) - radius * radius
+        _dot(xy_d, xy_d) - slope * slope,
+        _dot(xy_o, xy_d) - radius * slope,
+        _dot(xy_o, xy_o) - radius * radius,
     )
     found = []
     for t in roots:
@@ -77,7 +80,8 @@ def _flat(inside):
 
 
 def torus(o, d, minor):
-    """The quartic's roots in double, polished by Newton in extended precision, from the point nearest to the centre."""
+    """The quartic's roots in double, polished by Newton in extended precision, from the point nearest to the
+    centre."""
     shape = np.broadcast_shapes(o.shape, d.shape)[:-1]
     o, d = (np.broadcast_to(v, (*shape, 3)).reshape(-1, 3) for v in (o, d))
     length = np.sqrt(_dot(d, d))
@@ -129,8 +133,8 @@ def mesh_roots(o, d, vertices: np.ndarray, triangles: np.ndarray):
 
 
 def normal(kind: str, part: int, points: np.ndarray, argument) -> np.ndarray:
-    """Normals (k, 3) of a shape at points (k, 3) on it, in its own space, of any length and either sign; ``part``
-    is the place among the roots."""
+    """Normals (k, 3) of a shape at points (k, 3) on it, in its own space, of any length and either sign;
+    ``part`` is the place among the roots."""
     if kind == "sphere":
         return points
     if kind in ("cylinder", "cone") and part < 2:

@@ -1,8 +1,8 @@
 """Where the nodes of a diagram stand: layers from top to bottom, few crossings, straight long edges.
 
-The method is Sugiyama's (Sugiyama, Tagawa & Toda 1981): longest-path layers, invisible nodes where an edge passes a
-layer, barycentres for the order, and then several sweeps that pull each node towards its neighbours. Edges that
-close cycles take no part; they are led around the outside.
+The method is Sugiyama's (Sugiyama, Tagawa & Toda 1981): longest-path layers, invisible nodes where an edge
+passes a layer, barycentres for the order, and then several sweeps that pull each node towards its neighbours.
+Edges that close cycles take no part; they are led around the outside.
 
 Example: ``layout(diagram, widths).position[0]`` is the (x, y) of the root's circle, in points.
 """
@@ -21,16 +21,19 @@ SWEEPS = 24
 
 @dataclass
 class Layout:
-    """``position`` of each node; ``bends`` of each edge: the points at which it passes the layers between its ends."""
+    """``position`` of each node; ``bends`` of each edge: the points at which it passes the layers between its
+    ends."""
 
     position: list[tuple[float, float]]
     bends: list[list[tuple[float, float]]]
     layer: list[int]
 
 
-def layout(picture: Diagram, extents: list[tuple[float, float]], label_width: Callable[[str], float]) -> Layout:
-    """``extents`` are each node's reach to the left and to the right of its centre. An edge with a label has at least
-    one bend, the first, and room for the label there."""
+def layout(
+    picture: Diagram, extents: list[tuple[float, float]], label_width: Callable[[str], float]
+) -> Layout:
+    """``extents`` are each node's reach to the left and to the right of its centre. An edge with a label has
+    at least one bend, the first, and room for the label there."""
     layer = _layers(picture)
     slots = [*layer]
     reach = [*extents]
@@ -89,7 +92,8 @@ def _neighbours(count: int, links: list[tuple[int, int]]) -> tuple[list[list[int
 
 
 def _order(slots: list[int], links: list[tuple[int, int]]) -> list[list[int]]:
-    """The nodes of each layer from left to right. Starts in derivation order; keeps the best of several sweeps."""
+    """The nodes of each layer from left to right. Starts in derivation order; keeps the best of several
+    sweeps."""
     rows: list[list[int]] = [[] for _ in range(max(slots, default=-1) + 1)]
     above, below = _neighbours(len(slots), links)
     seen: set[int] = set()
@@ -123,8 +127,11 @@ def _crossings(rows: list[list[int]], below: list[list[int]]) -> int:
     return total
 
 
-def _place(rows: list[list[int]], slots: list[int], reach: list[tuple[float, float]], links: list[tuple[int, int]]):
-    """x of every node: rows keep their order and distances, and follow their neighbours' means as far as they can."""
+def _place(
+    rows: list[list[int]], slots: list[int], reach: list[tuple[float, float]], links: list[tuple[int, int]]
+):
+    """x of every node: rows keep their order and distances, and follow their neighbours' means as far as they
+    can."""
     above, below = _neighbours(len(slots), links)
     x = [0.0] * len(slots)
     for row in rows:

@@ -1,7 +1,7 @@
 """Arrays of affine maps: (n, 3, 4) float64, row by row, p' = M·(p, 1).
 
-Products are written out in elementwise operations (no BLAS, no fused multiply-add), so that an export has
-the same bits on every machine. Rotations take degrees and come from ``plsys.compiler.elementary``, whose right
+Products are written out in elementwise operations (no BLAS, no fused multiply-add), so that an export has the
+same bits on every machine. Rotations take degrees and come from ``plsys.compiler.elementary``, whose right
 angles are exact.
 
 Example: ``chain(translation(0, 0, 1), axis_rotation(2, 90))`` maps (1, 0, 0) to (0, 1, 1).
@@ -45,7 +45,10 @@ def is_singular(m: np.ndarray) -> np.ndarray:
     """(…) bool: the determinant is 0, or the inverse isn't finite in doubles."""
     with np.errstate(all="ignore"):
         a, b, c = (m[..., :, k] for k in range(3))
-        inverse = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2) / determinant(m)[..., None, None]
+        inverse = (
+            np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
+            / determinant(m)[..., None, None]
+        )
         shift = -np.sum(inverse * m[..., None, :, 3], axis=-1)
     return ~(np.isfinite(inverse).all(axis=(-2, -1)) & np.isfinite(shift).all(axis=-1))
 
@@ -88,9 +91,21 @@ def rotation(degrees: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray) -
         x, y, z = x / length, y / length, z / length
     rest = 1 - cosine
     m = np.zeros((np.size(degrees), 3, 4))
-    m[:, 0, 0], m[:, 0, 1], m[:, 0, 2] = cosine + rest * x * x, rest * x * y - sine * z, rest * x * z + sine * y
-    m[:, 1, 0], m[:, 1, 1], m[:, 1, 2] = rest * x * y + sine * z, cosine + rest * y * y, rest * y * z - sine * x
-    m[:, 2, 0], m[:, 2, 1], m[:, 2, 2] = rest * x * z - sine * y, rest * y * z + sine * x, cosine + rest * z * z
+    m[:, 0, 0], m[:, 0, 1], m[:, 0, 2] = (
+        cosine + rest * x * x,
+        rest * x * y - sine * z,
+        rest * x * z + sine * y,
+    )
+    m[:, 1, 0], m[:, 1, 1], m[:, 1, 2] = (
+        rest * x * y + sine * z,
+        cosine + rest * y * y,
+        rest * y * z - sine * x,
+    )
+    m[:, 2, 0], m[:, 2, 1], m[:, 2, 2] = (
+        rest * x * z - sine * y,
+        rest * y * z + sine * x,
+        cosine + rest * z * z,
+    )
     return m
 
 

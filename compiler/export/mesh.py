@@ -1,8 +1,8 @@
 """A graph → a triangle mesh: Wavefront OBJ with its materials, through trimesh.
 
-The scene is unfolded twice: once for its exact size and volume, once to be tessellated so that no facet is further
-from its surface than the tolerance. Each texture is one object and one material; flat shapes are objects of their
-own, so that the others enclose their volume.
+The scene is unfolded twice: once for its exact size and volume, once to be tessellated so that no facet is
+further from its surface than the tolerance. Each texture is one object and one material; flat shapes are
+objects of their own, so that the others enclose their volume.
 
 Example: ``export_mesh(graph, "tree.obj", tolerance=0.01).error`` is 0.0099: the largest distance there is.
 """
@@ -33,8 +33,9 @@ FINISHES = ("emission", "reflection")  # what a material of the format can't say
 
 @dataclass
 class ExportedMesh(Exported):
-    """``tolerance`` asked for and ``error`` reached, in scene units. ``volume`` of the solids and ``low``, ``high`` of
-    everything but planes are the exact scene's; ``mesh_volume`` is that of the facets, from closed forms as well."""
+    """``tolerance`` asked for and ``error`` reached, in scene units. ``volume`` of the solids and ``low``,
+    ``high`` of everything but planes are the exact scene's; ``mesh_volume`` is that of the facets, from
+    closed forms as well."""
 
     tolerance: float = 0.0
     error: float = 0.0
@@ -66,10 +67,12 @@ class _Part:
         return n * faces.shape[1]
 
 
-def export_mesh(graph: Graph, path: str | Path, tolerance: float | None = None, **limits: int) -> ExportedMesh:
+def export_mesh(
+    graph: Graph, path: str | Path, tolerance: float | None = None, **limits: int
+) -> ExportedMesh:
     """Writes ``path`` and the .mtl beside it, whole or not at all. ``tolerance`` is in scene units (None: a
-    thousandth of the scene's diagonal). Raises PlsysError for a tolerance that isn't positive, a scene without
-    anything to tessellate, or more than MOST_TRIANGLES triangles."""
+    thousandth of the scene's diagonal). Raises PlsysError for a tolerance that isn't positive, a scene
+    without anything to tessellate, or more than MOST_TRIANGLES triangles."""
     check_size(graph)
     result = _measure(graph, limits)
     diagonal = float(np.linalg.norm(result.high - result.low)) if np.isfinite(result.low).all() else 0.0
@@ -143,13 +146,16 @@ def _add(part: _Part, name: str, batch: Instances, graph: Graph, result: Exporte
         groups.setdefault((argument, _segments(mesher, result.tolerance / scale, argument)), []).append(i)
     for (argument, n), rows in groups.items():
         if mesher.volume is not None:
-            result.mesh_volume += mesher.volume(n, argument) * math.fsum(np.abs(determinant(batch.matrix[rows])))
+            result.mesh_volume += mesher.volume(n, argument) * math.fsum(
+                np.abs(determinant(batch.matrix[rows]))
+            )
         result.error = max(result.error, float(mesher.error(n, argument) * stretch[rows].max()))
         _place(part, batch.matrix[rows], *mesher.build(n, argument), result)
 
 
 def _segments(mesher: Mesher, relative: float, argument: float) -> int:
-    """Segments for a relative tolerance, rounded down to a power of 2^(1/4) so that neighbours share a mesh."""
+    """Segments for a relative tolerance, rounded down to a power of 2^(1/4) so that neighbours share a
+    mesh."""
     return segments_for(mesher, 2.0 ** (math.floor(4 * math.log2(relative)) / 4), argument)
 
 
@@ -162,7 +168,9 @@ def _stretch(name: str, m: np.ndarray) -> np.ndarray:
 def _place(part: _Part, m: np.ndarray, vertices: np.ndarray, faces: np.ndarray, result: ExportedMesh) -> None:
     result.triangles += len(m) * len(faces)
     if result.triangles > MOST_TRIANGLES:
-        raise PlsysError(f"the mesh needs more than {MOST_TRIANGLES} triangles; a larger tolerance needs fewer")
+        raise PlsysError(
+            f"the mesh needs more than {MOST_TRIANGLES} triangles; a larger tolerance needs fewer"
+        )
     mirrored = determinant(m) < 0
     faces = np.where(mirrored[:, None, None], faces[None, :, ::-1], faces[None])
     part.add(apply(m, vertices), faces)
@@ -228,13 +236,18 @@ def _material(part: _Part):
 
 
 def material_text(name: str, texture: Texture | None) -> str:
-    """A material in linear light: Ka and Kd are the pigment times ambient and 1, Ks the stronger highlight."""
+    """A material in linear light: Ka and Kd are the pigment times ambient and 1, Ks the stronger
+    highlight."""
     if texture is None:
         return f"newmtl {name}\nKa 0 0 0\nKd 0 0 0\nKs 0 0 0\nNs 1"
     color = texture.entries[0, 1:4] if len(texture.entries) else np.zeros(3)
     filtered = float(texture.entries[0, 4:].sum()) if len(texture.entries) else 0.0
     phong, specular = float(texture.value("phong")[0]), float(texture.value("specular")[0])
-    size = float(texture.value("phong_size")[0]) if phong >= specular else 1 / float(texture.value("roughness")[0])
+    size = (
+        float(texture.value("phong_size")[0])
+        if phong >= specular
+        else 1 / float(texture.value("roughness")[0])
+    )
     numbers = {
         "Ka": color * texture.value("ambient"),
         "Kd": color,
@@ -242,15 +255,18 @@ def material_text(name: str, texture: Texture | None) -> str:
         "Ns": [size],
         "d": [1 - min(1.0, filtered)],
     }
-    return "\n".join([f"newmtl {name}", *(f"{k} " + " ".join(f"{float(v)!r}" for v in vs) for k, vs in numbers.items())])
+    return "\n".join(
+        [f"newmtl {name}", *(f"{k} " + " ".join(f"{float(v)!r}" for v in vs) for k, vs in numbers.items())]
+    )
 
 
-# --- reading back --------------------------------------------------------------------------------------------------------
+# --- reading back ---
 
 
 @dataclass
 class MeshRead:
-    """What stands in a file: ``volume`` and ``area`` of the objects that enclose one, and everything's bounds."""
+    """What stands in a file: ``volume`` and ``area`` of the objects that enclose one, and everything's
+    bounds."""
 
     triangles: int
     volume: float
@@ -266,7 +282,9 @@ def read_back(path: str | Path) -> MeshRead:
     import trimesh
 
     logging.getLogger("trimesh").setLevel(logging.ERROR)
-    scene = trimesh.load_scene(path, split_objects=True, group_material=False, process=False, maintain_order=True)
+    scene = trimesh.load_scene(
+        path, split_objects=True, group_material=False, process=False, maintain_order=True
+    )
     objects = {mesh.metadata.get("name", name): mesh for name, mesh in scene.geometry.items()}
     solid = [mesh for name, mesh in objects.items() if OPEN not in name]
     corners = np.array([mesh.bounds for mesh in objects.values()])
@@ -282,9 +300,9 @@ def read_back(path: str | Path) -> MeshRead:
 
 
 def agrees(exported: ExportedMesh, read: MeshRead) -> bool:
-    """Whether a mesh read back is closed and has the scene's bounds within the stated error, the facets' volume within
-    the rounding of its numbers, and the exact volume as closely as surfaces moved by the error can have it (area
-    times error to first order; doubled for the rest)."""
+    """Whether a mesh read back is closed and has the scene's bounds within the stated error, the facets'
+    volume within the rounding of its numbers, and the exact volume as closely as surfaces moved by the error
+    can have it (area times error to first order; doubled for the rest)."""
     off = np.abs(np.concatenate([read.low - exported.low, read.high - exported.high]))
     rounding = read.area * 10.0 ** -digits_of(exported.tolerance) + 1e-12
     return (

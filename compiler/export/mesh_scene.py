@@ -1,7 +1,7 @@
 """A mesh read back from a file → a graph that can be drawn like the scene it came from.
 
-Each object of the file is one mesh leaf under the texture that it was exported with; camera, lights and the planes, which
-the file can't carry, are the scene's.
+Each object of the file is one mesh leaf under the texture that it was exported with; camera, lights and the
+planes, which the file can't carry, are the scene's.
 
 Example: ``mesh_graph(graph, exported, read_back("tree.obj"))``
 """
@@ -26,7 +26,13 @@ def mesh_graph(graph: g.Graph, exported: ExportedMesh, read: MeshRead) -> g.Grap
     objects = []
     for name, mesh in read.objects.items():
         result.meshes.append(
-            Mesh(name, np.asarray(mesh.vertices), np.zeros((0, 3)), np.asarray(mesh.faces), np.zeros((0, 3), np.int64))
+            Mesh(
+                name,
+                np.asarray(mesh.vertices),
+                np.zeros((0, 3)),
+                np.asarray(mesh.faces),
+                np.zeros((0, 3), np.int64),
+            )
         )
         leaf = result.add(g.MeshLeaf(len(result.meshes) - 1))
         objects.append(_object(result, exported.textures.get(name), leaf))
@@ -59,7 +65,8 @@ def _planes(graph: g.Graph) -> list[tuple[Texture | None, np.ndarray]]:
 
 
 def texture_value(texture: Texture) -> TextureValue:
-    """The constant texture whose frame is the world: a pattern's own matrix takes in the frame where it stood."""
+    """The constant texture whose frame is the world: a pattern's own matrix takes in the frame where it
+    stood."""
     row = texture.row.copy()
     field = RECORDS["texture"].values["matrix"]
     if texture.pattern != "solid":

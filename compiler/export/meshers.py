@@ -1,11 +1,11 @@
 """Triangles for the unit shapes: one function a shape, n segments around → vertices and faces.
 
-Solids are watertight, and all faces are seen counter-clockwise from outside. Vertices lie on the surface, so the
-error is that of chords: ``error(n, argument)`` is how far the triangles stay from the surface, in units of the largest
-stretch of the transform.
+Solids are watertight, and all faces are seen counter-clockwise from outside. Vertices lie on the surface, so
+the error is that of chords: ``error(n, argument)`` is how far the triangles stay from the surface, in units
+of the largest stretch of the transform.
 
-Example: ``MESHERS["cylinder"].build(6, 0.0)`` is a hexagonal prism: 14 vertices, 24 faces; 0.134 from the cylinder.
-"""
+Example: ``MESHERS["cylinder"].build(6, 0.0)`` is a hexagonal prism: 14 vertices, 24 faces; 0.134 from the
+cylinder."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def _chord(n: float) -> float:
 
 @dataclass(frozen=True)
 class Mesher:
-    """``error`` is 0 where triangles are exact. ``volume`` is what the triangles enclose, in closed form; None for
-    flat shapes, which enclose nothing."""
+    """``error`` is 0 where triangles are exact. ``volume`` is what the triangles enclose, in closed form;
+    None for flat shapes, which enclose nothing."""
 
     build: Callable[[int, float], Triangles]
     error: Callable[[int, float], float]
@@ -55,8 +55,8 @@ def _ring(n: int, radius: float, z: float) -> np.ndarray:
 
 
 def _band(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Two triangles for each pair of neighbours on two closed rings of vertex indices; outside is to the right of
-    the rings' direction."""
+    """Two triangles for each pair of neighbours on two closed rings of vertex indices; outside is to the
+    right of the rings' direction."""
     a, b, c, d = lower, np.roll(lower, -1), np.roll(upper, -1), upper
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
@@ -85,7 +85,9 @@ def sphere(n: int, _: float) -> Triangles:
     rings = np.arange(n * (bands - 1)).reshape(bands - 1, n)
     south, north = n * (bands - 1), n * (bands - 1) + 1
     faces = [_band(a, b) for a, b in zip(rings, rings[1:])]
-    return np.concatenate(vertices), np.concatenate([*faces, _fan(south, rings[0][::-1]), _fan(north, rings[-1])])
+    return np.concatenate(vertices), np.concatenate(
+        [*faces, _fan(south, rings[0][::-1]), _fan(north, rings[-1])]
+    )
 
 
 def torus(n: int, minor: float) -> Triangles:
@@ -120,8 +122,8 @@ def _exact(n: int, argument: float) -> float:
 
 
 def _turned(n: int, r: np.ndarray, z: np.ndarray) -> float:
-    """Volume of the profile (r, z), a chain of straight pieces, turned about z in n flat steps: each piece is a
-    frustum over a regular n-gon."""
+    """Volume of the profile (r, z), a chain of straight pieces, turned about z in n flat steps: each piece is
+    a frustum over a regular n-gon."""
     pieces = np.diff(z) * (r[:-1] ** 2 + r[:-1] * r[1:] + r[1:] ** 2) / 3
     return float(n / 2 * np.sin(2 * np.pi / n) * pieces.sum())
 
@@ -143,7 +145,9 @@ def _torus_volume(n: int, minor: float) -> float:
 MESHERS = {
     # A facet of the sphere spans one step of longitude and one of latitude; the torus's likewise.
     "sphere": Mesher(sphere, lambda n, _: 2 * _chord(n), _sphere_volume),
-    "cylinder": Mesher(lambda n, _: frustum(n, 1.0), lambda n, _: _chord(n), lambda n, _: _frustum_volume(n, 1.0)),
+    "cylinder": Mesher(
+        lambda n, _: frustum(n, 1.0), lambda n, _: _chord(n), lambda n, _: _frustum_volume(n, 1.0)
+    ),
     "cone": Mesher(frustum, lambda n, top: max(1.0, top) * _chord(n), _frustum_volume),
     "box": Mesher(box, _exact, lambda n, _: 1.0),
     "torus": Mesher(torus, lambda n, minor: (1 + 2 * minor) * _chord(n), _torus_volume),

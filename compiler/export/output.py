@@ -20,7 +20,6 @@ from ..graph.graph import Graph
 from ..reading.diagnostics import PlsysError
 from .unfold import SHAPE_NAMES, Instances, Unfolding
 
-
 MOST_PRIMITIVES = 100_000_000
 """Of an export: about 15 GB of text for POV-Ray, which needs ten times as much memory to read it."""
 
@@ -41,25 +40,32 @@ class Exported:
 
     def finish(self, unfolding: Unfolding) -> None:
         if unfolding.singular:
-            self.lost.append(f"{unfolding.singular} subtrees under singular transformations, which have no volume")
+            self.lost.append(
+                f"{unfolding.singular} subtrees under singular transformations, which have no volume"
+            )
 
 
 def check_size(graph: Graph, most_primitives: int = MOST_PRIMITIVES) -> None:
-    """PlsysError where it is known beforehand that the unfolding has no end, or more primitives than an export may
-    have. What depends on draws is found out by the unfolder's own limits."""
+    """PlsysError where it is known beforehand that the unfolding has no end, or more primitives than an
+    export may have. What depends on draws is found out by the unfolder's own limits."""
     prediction = forecast(graph)
     if prediction.infinite:
-        raise PlsysError("a scene without end can't be unfolded: its recursion must stop at some depth to be exported")
+        raise PlsysError(
+            "a scene without end can't be unfolded: its recursion must stop at some depth to be exported"
+        )
     if (prediction.primitives or 0) > most_primitives:
         digits = len(str(prediction.primitives))
         count = f"{prediction.primitives:,}" if digits <= 15 else f"a number of {digits} digits of"
-        raise PlsysError(f"the scene unfolds into {count} primitives; an export has at most {most_primitives:,} (max_primitives)")
+        raise PlsysError(
+            f"the scene unfolds into {count} primitives; "
+            f"an export has at most {most_primitives:,} (max_primitives)"
+        )
 
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[TextIO]:
-    """A text file to write; it takes the name ``path`` when all is written and leaves nothing behind on an error.
-    PlsysError where ``path`` can't be written."""
+    """A text file to write; it takes the name ``path`` when all is written and leaves nothing behind on an
+    error. PlsysError where ``path`` can't be written."""
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:

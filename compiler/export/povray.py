@@ -1,15 +1,14 @@
 """A graph → a POV-Ray 3.7 scene that draws the same picture.
 
-The scene is unfolded, grouped into one ``union`` per texture (and its frame, where it has a pattern), and written
-in memory that doesn't grow with it: primitives go to a spool file first, group by group they are then copied
-behind the camera and the lights.
+The scene is unfolded, grouped into one ``union`` per texture (and its frame, where it has a pattern), and
+written in memory that doesn't grow with it: primitives go to a spool file first, group by group they are then
+copied behind the camera and the lights.
 
 Example: ``export_povray(graph, "tree.pov").primitives`` is 2050; then ``povray +Itree.pov +Otree.png``.
 """
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,8 +23,8 @@ from .textures import Palette, Texture
 from .unfold import unfold
 
 MOST_UNIONS = 4096
-"""Textures beyond this number are written with each primitive, so that a scene in which every leaf has a colour of its
-own needs no list of all colours."""
+"""Textures beyond this number are written with each primitive, so that a scene in which every leaf has a
+colour of its own needs no list of all colours."""
 
 
 @dataclass
@@ -39,8 +38,8 @@ class _Group:
 
 
 def export_povray(graph: Graph, path: str | Path, **limits: int) -> Exported:
-    """Writes the scene to ``path``, whole or not at all. ``limits`` are those of :func:`unfold.unfold`. Raises
-    PlsysError where the scene can't be unfolded or the file can't be written."""
+    """Writes the scene to ``path``, whole or not at all. ``limits`` are those of :func:`unfold.unfold`.
+    Raises PlsysError where the scene can't be unfolded or the file can't be written."""
     check_size(graph)
     result = Exported()
     with whole_file(path) as file, tempfile.TemporaryFile(dir=Path(path).parent) as spool:
@@ -110,7 +109,7 @@ def _copy(source: BinaryIO, target: BinaryIO, length: int) -> None:
         length -= len(block)
 
 
-# --- the scene around the primitives ---------------------------------------------------------------------------------
+# --- the scene around the primitives ---
 
 
 def _write_head(graph: Graph, file: TextIO, result: Exported) -> None:
@@ -138,14 +137,17 @@ def _settings(record: Record | None) -> str:
     values = values_of(record, "settings")
     return (
         f"global_settings {{ assumed_gamma 1.0 max_trace_level {int(values['max_trace_level'][0])} "
-        f"adc_bailout {values['adc_bailout'][0]!r} ambient_light rgb{text.vector(values['ambient_light'])} }}\n"
+        f"adc_bailout {values['adc_bailout'][0]!r} "
+        f"ambient_light rgb{text.vector(values['ambient_light'])} }}\n"
         f"background {{ rgb{text.vector(values['background'])} }}"
     )
 
 
 def _camera(record: Record) -> str:
     values = values_of(record, "camera")
-    words = [f"{name} {text.vector(values[name])}" for name in ("location", "direction", "right", "up", "sky")]
+    words = [
+        f"{name} {text.vector(values[name])}" for name in ("location", "direction", "right", "up", "sky")
+    ]
     if values["angle"][0]:
         words.append(f"angle {values['angle'][0]!r}")
     if values["has_look_at"][0]:

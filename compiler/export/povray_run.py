@@ -1,7 +1,7 @@
 """Running POV-Ray for a reference picture in linear light.
 
-The command line and the file's meaning are POV-Ray 3.7's: 16-bit values, no gamma, no dithering, no antialiasing.
-Time and memory are those of its process alone.
+The command line and the file's meaning are POV-Ray 3.7's: 16-bit values, no gamma, no dithering, no
+antialiasing. Time and memory are those of its process alone.
 
 Example: ``draw("tree.pov", 640, 480).pixels`` is a (480, 640, 3) float32 array in [0, 1].
 """
@@ -26,7 +26,8 @@ LAST_LINES = 6  # of POV-Ray's messages, shown when it fails
 
 @dataclass
 class Drawing:
-    """``pixels`` (height, width, 3) float32, linear; ``seconds`` of wall time; ``rss`` the process's peak bytes."""
+    """``pixels`` (height, width, 3) float32, linear; ``seconds`` of wall time; ``rss`` the process's peak
+    bytes."""
 
     pixels: np.ndarray
     seconds: float
@@ -37,7 +38,9 @@ def find_povray() -> str:
     """The program's path; PlsysError with what to do where there is none."""
     program = shutil.which("povray")
     if program is None:
-        raise PlsysError("POV-Ray isn't installed ('povray' is not on the PATH); on Debian: apt-get install povray")
+        raise PlsysError(
+            "POV-Ray isn't installed ('povray' is not on the PATH); on Debian: apt-get install povray"
+        )
     return program
 
 
@@ -46,12 +49,24 @@ def draw(scene: str | Path, width: int, height: int) -> Drawing:
     program = find_povray()
     with tempfile.TemporaryDirectory() as folder:
         image, log = Path(folder) / "povray.png", Path(folder) / "log.txt"
-        command = [program, f"+I{Path(scene).resolve()}", f"+O{image}", f"+W{width}", f"+H{height}", *SETTINGS]
+        command = [
+            program,
+            f"+I{Path(scene).resolve()}",
+            f"+O{image}",
+            f"+W{width}",
+            f"+H{height}",
+            *SETTINGS,
+        ]
         started = time.perf_counter()
         with open(log, "wb") as messages:
             # A folder of its own: POV-Ray may leave state files where it runs.
             child = subprocess.Popen(
-                command, cwd=folder, stdin=subprocess.DEVNULL, stdout=messages, stderr=messages, env=_environment(folder)
+                command,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=messages,
+                stderr=messages,
+                env=_environment(folder),
             )
             _, status, usage = os.wait4(child.pid, 0)
             child.returncode = os.waitstatus_to_exitcode(status)

@@ -1,8 +1,8 @@
 """POV-Ray's spelling of numbers, textures and primitives.
 
-Numbers are written with the fewest digits that read back as the same double (17 at most). A primitive is written
-in world coordinates, ``cylinder{p0,p1,r}`` and its like, wherever its transform keeps the shape what it is, and as the
-unit shape with a ``matrix`` otherwise: the first takes half of POV-Ray's memory.
+Numbers are written with the fewest digits that read back as the same double (17 at most). A primitive is
+written in world coordinates, ``cylinder{p0,p1,r}`` and its like, wherever its transform keeps the shape what
+it is, and as the unit shape with a ``matrix`` otherwise: the first takes half of POV-Ray's memory.
 
 Example: the unit cylinder, scaled by .15 .15 2, is ``cylinder{<0.0,0.0,0.0>,<0.0,0.0,2.0>,0.15}``.
 """
@@ -20,8 +20,9 @@ from .textures import Texture
 from .unfold import Instances
 
 ROUND = 1e-12
-"""How far, relatively, a transform may be from a similarity and still count as one. Chains of a thousand rotations
-stay below it, and it moves no surface by more than a millionth of the 1e-5 that pictures are compared at."""
+"""How far, relatively, a transform may be from a similarity and still count as one. Chains of a thousand
+rotations stay below it, and it moves no surface by more than a millionth of the 1e-5 that pictures are
+compared at."""
 
 SMALLEST = 1e-7
 """POV-Ray refuses cylinders and cones shorter than 1e-10; below this size they are written with a matrix."""
@@ -61,7 +62,9 @@ def texture(value: Texture) -> str:
         own = value.value("matrix").reshape(3, 4)
         if not np.array_equal(own, IDENTITY):
             pigment += " " + matrix(own)
-    placed = "" if value.pattern == "solid" or np.array_equal(value.frame, IDENTITY) else " " + matrix(value.frame)
+    placed = (
+        "" if value.pattern == "solid" or np.array_equal(value.frame, IDENTITY) else " " + matrix(value.frame)
+    )
     return f"texture {{ pigment {{ {pigment} }} {finish(value)}{placed} }}"
 
 
@@ -92,7 +95,7 @@ def _listed(word: str, rows: np.ndarray, kind: type) -> str:
     return f"{word} {{ {len(rows)},\n{items} }}"
 
 
-# --- primitives ----------------------------------------------------------------------------------------------------
+# --- primitives ---
 
 
 def primitives(batch: Instances) -> np.ndarray:

@@ -1,12 +1,13 @@
 """Tracing single pixels again, exactly enough to say which of two pictures is right.
 
-A pixel's colour hangs on decisions: which surface each ray of its ray tree hits, which lights are in shadow, which square
-of a checker it is. The retracer takes these decisions over the unfolded primitives in extended precision, for the pixel
-itself and for neighbours a millionth of a pixel away. Where neighbours decide otherwise the pixel is *ambiguous*: rounding
-alone may turn it. Where they agree, a renderer that decided otherwise is wrong.
+A pixel's colour hangs on decisions: which surface each ray of its ray tree hits, which lights are in shadow,
+which square of a checker it is. The retracer takes these decisions over the unfolded primitives in extended
+precision, for the pixel itself and for neighbours a millionth of a pixel away. Where neighbours decide
+otherwise the pixel is *ambiguous*: rounding alone may turn it. Where they agree, a renderer that decided
+otherwise is wrong.
 
-Example: ``Retracer(graph).decide(pixel_rays)`` is a :class:`Verdict` with ``is_ambiguous`` and the hits to compare with.
-"""
+Example: ``Retracer(graph).decide(pixel_rays)`` is a :class:`Verdict` with ``is_ambiguous`` and the hits to
+compare with."""
 
 from __future__ import annotations
 
@@ -31,8 +32,8 @@ CHECKER_BIAS = 1e-10
 
 @dataclass
 class Ray:
-    """A ray that was decided: ``primitive`` is the nearest with a hit before ``end``, -1 for none. Shadow rays only
-    ask whether there is one."""
+    """A ray that was decided: ``primitive`` is the nearest with a hit before ``end``, -1 for none. Shadow
+    rays only ask whether there is one."""
 
     origin: np.ndarray
     direction: np.ndarray
@@ -89,7 +90,7 @@ class Retracer:
             self._follow(verdict, origins, directions.astype(LONG), level=0, weight=1.0)
         return verdict
 
-    # --- the ray tree ------------------------------------------------------------------------------------------------
+    # --- the ray tree ---
 
     def _follow(self, verdict: Verdict, origins, directions, level: int, weight: float) -> None:
         """Decides one bundle of rays, then those that start where it hits. Stops at the first ambiguity."""
@@ -119,7 +120,8 @@ class Retracer:
             self._follow(verdict, points, mirrored, level + 1, weight * reflection)
 
     def _nearest(self, verdict: Verdict, rows: np.ndarray, t: np.ndarray) -> _Surface | None:
-        """The surface that the whole bundle hits first; None where it hits nothing. ``t`` is (roots, k, c)."""
+        """The surface that the whole bundle hits first; None where it hits nothing. ``t`` is (roots, k,
+        c)."""
         if t.size == 0:
             return None
         near = t[:, 0]
@@ -139,7 +141,8 @@ class Retracer:
         return _Surface(int(rows[column]), part, foremost)
 
     def _shadow(self, verdict: Verdict, points: np.ndarray, light: dict) -> None:
-        """One decision a light: all points of the bundle are lit alike, with either of POV-Ray's tolerances."""
+        """One decision a light: all points of the bundle are lit alike, with either of POV-Ray's
+        tolerances."""
         location = np.array(light["location"], LONG)
         towards = location - points
         if light["parallel"][0]:
@@ -177,11 +180,11 @@ class Retracer:
         close = np.abs(value[0] - np.rint(value[0])) < margin * np.maximum(1, np.abs(value[0]))
         return bool((cell != cell[0]).any() or close.any())
 
-    # --- geometry ----------------------------------------------------------------------------------------------------
+    # --- geometry ---
 
     def _hits(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """All t of k rays with the primitives near the first: (c,) primitive numbers and (roots, k, c), NaN where
-        there is none."""
+        """All t of k rays with the primitives near the first: (c,) primitive numbers and (roots, k, c), NaN
+        where there is none."""
         rows = self._near(origins[0].astype(float), directions[0].astype(float))
         found = []
         with np.errstate(all="ignore"):
@@ -195,7 +198,9 @@ class Retracer:
 
     def _near(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Primitives whose boxes, a little enlarged, the ray meets."""
-        slack = 1e-5 * (1 + np.abs(origin).max() + np.where(np.isfinite(self.high - self.low), self.high - self.low, 0))
+        slack = 1e-5 * (
+            1 + np.abs(origin).max() + np.where(np.isfinite(self.high - self.low), self.high - self.low, 0)
+        )
         with np.errstate(all="ignore"):
             a, b = (self.low - slack - origin) / direction, (self.high + slack - origin) / direction
             enter, leave = np.fmin(a, b).max(axis=1), np.fmax(a, b).min(axis=1)
@@ -216,7 +221,10 @@ class Retracer:
         m = self.scene.matrix[surface.primitive].astype(LONG)
         inverse = _inverse(m[:, :3])
         local = (points - m[:, 3]) @ inverse.T
-        kind, argument = SHAPE_NAMES[int(self.scene.kind[surface.primitive])], self.scene.argument[surface.primitive]
+        kind, argument = (
+            SHAPE_NAMES[int(self.scene.kind[surface.primitive])],
+            self.scene.argument[surface.primitive],
+        )
         if kind == "mesh":
             mesh = self.meshes[int(argument)]
             a, b, c = np.asarray(mesh.vertices, LONG)[mesh.triangles[surface.part]]

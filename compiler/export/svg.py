@@ -37,13 +37,21 @@ def svg(picture: Diagram, title: str = "") -> str:
     """The whole picture as one text."""
     placed = layout(picture, [_extent(picture, i) for i in range(len(picture.nodes))], _width)
     lanes = _lanes(picture, placed)
-    left = min([p[0] - _extent(picture, i)[0] for i, p in enumerate(placed.position)] + [x for x, _ in lanes.values()])
-    right = max([p[0] + _extent(picture, i)[1] for i, p in enumerate(placed.position)] + [x for x, _ in lanes.values()])
+    left = min(
+        [p[0] - _extent(picture, i)[0] for i, p in enumerate(placed.position)]
+        + [x for x, _ in lanes.values()]
+    )
+    right = max(
+        [p[0] + _extent(picture, i)[1] for i, p in enumerate(placed.position)]
+        + [x for x, _ in lanes.values()]
+    )
     bottom = max(y for _, y in placed.position) + 46
     width, height = right - left + 2 * MARGIN, bottom + RADIUS + 2 * MARGIN
     parts = []
     for index, (edge, bends) in enumerate(zip(picture.edges, placed.bends)):
-        parts.append(_back(edge, placed, *lanes[index]) if edge.is_back else _edge(picture, edge, placed, bends))
+        parts.append(
+            _back(edge, placed, *lanes[index]) if edge.is_back else _edge(picture, edge, placed, bends)
+        )
     for edge, bends in zip(picture.edges, placed.bends):
         parts.append(_text("guard", bends[0][0], bends[0][1] + 4, edge.label) if bends else "")
     parts += [_node(node, *at) for node, at in zip(picture.nodes, placed.position)]
@@ -53,7 +61,8 @@ def svg(picture: Diagram, title: str = "") -> str:
             f'viewBox="{left - MARGIN:.1f} {-RADIUS - MARGIN:.1f} {width:.1f} {height:.1f}">',
             f"<title>{escape(title)}</title>",
             f"<style>\n{STYLE}\n</style>",
-            f'<rect x="{left - MARGIN:.1f}" y="{-RADIUS - MARGIN:.1f}" width="100%" height="100%" fill="#ffffff"/>',
+            f'<rect x="{left - MARGIN:.1f}" y="{-RADIUS - MARGIN:.1f}" '
+            'width="100%" height="100%" fill="#ffffff"/>',
             *parts,
             "</svg>",
             "",
@@ -77,12 +86,13 @@ def _node(node: Node, x: float, y: float) -> str:
     if not node.letter:
         half = _width(node.label) / 2 + 8
         return (
-            f'<rect class="node" x="{x - half:.1f}" y="{y - 12:.1f}" width="{2 * half:.1f}" height="24" rx="5" '
-            f'fill="#f3f4f6"/><text class="name object" x="{x:.1f}" y="{y + 4:.1f}">{escape(node.label)}</text>'
+            f'<rect class="node" x="{x - half:.1f}" y="{y - 12:.1f}" width="{2 * half:.1f}" height="24" '
+            f'rx="5" fill="#f3f4f6"/>'
+            f'<text class="name object" x="{x:.1f}" y="{y + 4:.1f}">{escape(node.label)}</text>'
         )
     name = _text("name", x + RADIUS + 5, y + 4, node.label)
     return (
-        f'<circle class="node" cx="{x:.1f}" cy="{y:.1f}" r="{RADIUS}" fill="{COLOURS.get(node.letter, "#ffffff")}"/>'
+        f'<circle class="node" cx="{x:.1f}" cy="{y:.1f}" r="{RADIUS}" fill="{COLOURS[node.letter]}"/>'
         f'<text class="letter" x="{x:.1f}" y="{y + 5.3:.1f}">{escape(node.letter)}</text>{name}'
     )
 
@@ -117,15 +127,17 @@ def _text(style: str, x: float, y: float, text: str) -> str:
     return f'<text class="{style} halo" {place}<text class="{style}" {place}'
 
 
-def _towards(origin: tuple[float, float], target: tuple[float, float], distance: float) -> tuple[float, float]:
+def _towards(
+    origin: tuple[float, float], target: tuple[float, float], distance: float
+) -> tuple[float, float]:
     dx, dy = target[0] - origin[0], target[1] - origin[1]
     length = (dx * dx + dy * dy) ** 0.5 or 1.0
     return origin[0] + dx / length * distance, origin[1] + dy / length * distance
 
 
 def _lanes(picture: Diagram, placed: Layout) -> dict[int, tuple[float, float]]:
-    """For each back edge the x of its way up, outside of everything between its ends, on the nearer side; and how
-    far below its source it turns."""
+    """For each back edge the x of its way up, outside of everything between its ends, on the nearer side; and
+    how far below its source it turns."""
     lanes: dict[int, tuple[float, float]] = {}
     taken = {-1: 0, 1: 0}
     turns: dict[int, int] = {}
@@ -161,7 +173,8 @@ def _back(edge: Edge, placed: Layout, lane: float, drop: float) -> str:
         f"M{sx:.1f},{sy + RADIUS:.1f} L{sx:.1f},{floor - corner + 2:.1f} "
         f"Q{sx:.1f},{floor:.1f} {sx + side * corner:.1f},{floor:.1f} "
         f"L{lane - side * corner:.1f},{floor:.1f} Q{lane:.1f},{floor:.1f} {lane:.1f},{floor - corner:.1f} "
-        f"L{lane:.1f},{ceiling + corner:.1f} Q{lane:.1f},{ceiling:.1f} {lane - side * corner:.1f},{ceiling:.1f} "
+        f"L{lane:.1f},{ceiling + corner:.1f} "
+        f"Q{lane:.1f},{ceiling:.1f} {lane - side * corner:.1f},{ceiling:.1f} "
         f"L{entry + side * corner:.1f},{ceiling:.1f} Q{entry:.1f},{ceiling:.1f} {tip[0]:.1f},{tip[1]:.1f}"
     )
     return f'<path class="back" d="{path}"/>' + _head("turn", tip, (entry, tip[1] - 1))

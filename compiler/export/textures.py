@@ -1,8 +1,8 @@
 """Texture values as rows of numbers, and the fixed order in which an instance's texture is evaluated.
 
-A texture is one row: the values of the ``texture`` record of runtime/bytecode.toml, then six numbers per colour
-entry (position, red, green, blue, filter, transmit). Where an expression depends on parameters, each instance has a
-row of its own.
+A texture is one row: the values of the ``texture`` record of runtime/bytecode.toml, then six numbers per
+colour entry (position, red, green, blue, filter, transmit). Where an expression depends on parameters, each
+instance has a row of its own.
 
 Example: ``Texture(row).color`` of a solid red texture is ``(1, 0, 0, 0, 0)``.
 """
@@ -27,8 +27,8 @@ PATTERN_NAMES = {number: name for name, number in PATTERNS.items()}
 
 @dataclass(frozen=True)
 class Texture:
-    """One texture: ``row`` as above, ``frame`` the (3, 4) map of the place where it stands to the world, ``name`` that
-    of its first operator, or ''."""
+    """One texture: ``row`` as above, ``frame`` the (3, 4) map of the place where it stands to the world,
+    ``name`` that of its first operator, or ''."""
 
     row: np.ndarray
     frame: np.ndarray
@@ -89,8 +89,8 @@ NOTHING = Scope(np.zeros((1, 0)), np.zeros(1, np.uint64), np.zeros((1, 0), np.ui
 
 
 class Palette:
-    """Names the distinct textures of a scene's batches: equal values, and equal frames where they matter, are one
-    texture, however many operators and places it comes from."""
+    """Names the distinct textures of a scene's batches: equal values, and equal frames where they matter, are
+    one texture, however many operators and places it comes from."""
 
     def __init__(self, graph) -> None:
         self._nodes = graph.nodes
@@ -114,7 +114,9 @@ class Palette:
         else:
             used, inverse = np.unique(batch.texture, return_inverse=True)
             look = np.array([self._same[node] for node in used.tolist()], float)[inverse][:, None]
-            patterns = [node >= 0 and self._rows[node][RECORD.values["pattern"].offset] > 0 for node in used.tolist()]
+            patterns = [
+                node >= 0 and self._rows[node][RECORD.values["pattern"].offset] > 0 for node in used.tolist()
+            ]
             has_pattern = np.array(patterns)[inverse]
         frame = np.broadcast_to(IDENTITY, (n, 3, 4))
         if batch.frame.shape[1]:

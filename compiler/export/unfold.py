@@ -1,10 +1,10 @@
 """The unfolder: a cyclic graph → the primitives of its derivation, level by level, in batches.
 
-It proves the runtime's derivation and feeds the exports; it shares nothing with the runtime but the elementary
-functions. One step derives every pending symbol instance of a chunk at once: instances at the same node are one
-set of NumPy arrays. A chunk is kept in derivation order (lexicographic in the union terms' indices), so the i-th
-primitive here is the runtime's primitive i. Chunks that grow too wide are cut, and the rest waits on a stack: memory
-is proportional to depth × chunk, not to the scene.
+It proves the runtime's derivation and feeds the exports; it shares nothing with the runtime but the
+elementary functions. One step derives every pending symbol instance of a chunk at once: instances at the same
+node are one set of NumPy arrays. A chunk is kept in derivation order (lexicographic in the union terms'
+indices), so the i-th primitive here is the runtime's primitive i. Chunks that grow too wide are cut, and the
+rest waits on a stack: memory is proportional to depth × chunk, not to the scene.
 
 Example::
 
@@ -33,9 +33,10 @@ SHAPE_NAMES = {0: "mesh"} | {row.id: row.name for row in SHAPES.values()}
 
 @dataclass(slots=True)
 class Instances:
-    """n places in the derivation; every field has n rows. ``kind`` is a shape id, 0 for a mesh, or -1 - node for
-    a symbol yet to be entered; ``argument`` the shape's argument or the mesh's index; ``texture`` a texture node
-    (-1: none); ``frame`` and ``values`` have no columns unless a texture of the graph needs them."""
+    """n places in the derivation; every field has n rows. ``kind`` is a shape id, 0 for a mesh, or -1 - node
+    for a symbol yet to be entered; ``argument`` the shape's argument or the mesh's index; ``texture`` a
+    texture node (-1: none); ``frame`` and ``values`` have no columns unless a texture of the graph needs
+    them."""
 
     parent: np.ndarray  # (n,) int64: which instance of the last step this one comes from
     kind: np.ndarray  # (n,) int32
@@ -81,15 +82,16 @@ def unfold(
     max_pending: int = 4_000_000,
     paths: bool = False,
 ) -> Unfolding:
-    """The unfolding of ``graph``, to be iterated once. ``chunk`` is the breadth of a step. The three limits end
-    endless or oversized derivations with a PlsysError that names them; ``paths`` keeps each primitive's path."""
+    """The unfolding of ``graph``, to be iterated once. ``chunk`` is the breadth of a step. The three limits
+    end endless or oversized derivations with a PlsysError that names them; ``paths`` keeps each primitive's
+    path."""
     return Unfolding(graph, chunk, max_primitives, max_depth, max_pending, paths)
 
 
 class Unfolding:
-    """An iterator over batches of finished :class:`Instances` in derivation order. ``primitives``, ``depth`` (most
-    symbols entered), ``singular`` (subtrees dropped because a transformation was singular) and ``widest`` (most
-    instances held at once) count what has been derived so far."""
+    """An iterator over batches of finished :class:`Instances` in derivation order. ``primitives``, ``depth``
+    (most symbols entered), ``singular`` (subtrees dropped because a transformation was singular) and
+    ``widest`` (most instances held at once) count what has been derived so far."""
 
     def __init__(self, graph, chunk, max_primitives, max_depth, max_pending, paths) -> None:
         self.graph, self.chunk, self.paths = graph, chunk, paths
@@ -110,7 +112,9 @@ class Unfolding:
         for part in self._finished():
             self.primitives += len(part)
             if self.primitives > self.max_primitives:
-                raise PlsysError(f"the scene unfolds into more than {self.max_primitives} primitives (max_primitives)")
+                raise PlsysError(
+                    f"the scene unfolds into more than {self.max_primitives} primitives (max_primitives)"
+                )
             waiting.append(part)
             size += len(part)
             if size >= self.chunk:
@@ -142,12 +146,15 @@ class Unfolding:
     def _check_size(self, stack: list[Instances]) -> None:
         self.depth = max(self.depth, int(stack[-1].depth.max(initial=0)))
         if self.depth > self.max_depth:
-            raise PlsysError(f"the derivation enters more than {self.max_depth} symbols on one path (max_depth)")
+            raise PlsysError(
+                f"the derivation enters more than {self.max_depth} symbols on one path (max_depth)"
+            )
         held = sum(map(len, stack))
         self.widest = max(self.widest, held)
         if held > self.max_pending:
             raise PlsysError(
-                f"the derivation is too wide or endless: more than {self.max_pending} instances wait (max_pending)"
+                f"the derivation is too wide or endless: more than {self.max_pending} instances wait "
+                "(max_pending)"
             )
 
     def _root(self) -> Instances:
@@ -173,8 +180,8 @@ class Unfolding:
 
 
 class _Derivation:
-    """One step: ``emitted`` collects primitives and symbol references. For any one parent they come in derivation
-    order, because unions are walked term by term; a stable sort by parent then orders them all."""
+    """One step: ``emitted`` collects primitives and symbol references. For any one parent they come in
+    derivation order, because unions are walked term by term; a stable sort by parent then orders them all."""
 
     def __init__(self, unfolding: Unfolding) -> None:
         self.unfolding, self.nodes = unfolding, unfolding.graph.nodes
@@ -194,7 +201,9 @@ class _Derivation:
             node, here = -1 - int(kind), chunk.take(chunk.kind == kind)
             key = elementary.mix(here.key, elementary.name_hash(self.nodes[node].name))
             symbol = np.full(len(here), node, np.int32)
-            self._walk(self.nodes[node].body, here.but(key=key, symbol=symbol, depth=here.depth + np.int32(1)))
+            self._walk(
+                self.nodes[node].body, here.but(key=key, symbol=symbol, depth=here.depth + np.int32(1))
+            )
         return self._ordered(chunk)
 
     def _ordered(self, like: Instances) -> Instances:
@@ -215,7 +224,9 @@ class _Derivation:
 
     def _scope(self, instances: Instances) -> Scope:
         unfolding = self.unfolding
-        return Scope(instances.parameters, instances.key, instances.draws, unfolding.slots, unfolding.seed_key)
+        return Scope(
+            instances.parameters, instances.key, instances.draws, unfolding.slots, unfolding.seed_key
+        )
 
     def _walk(self, index: int, at: Instances) -> None:
         """Derives ``at`` from node ``index`` on, down to primitives and symbol references. Long prefixes
@@ -244,7 +255,9 @@ class _Derivation:
                     scope = self._scope(at)
                     test = evaluate(node.test, scope)
                     if not np.isfinite(test).all():
-                        raise PlsysError("a condition is not a finite number", place(node.test) or place(node))
+                        raise PlsysError(
+                            "a condition is not a finite number", place(node.test) or place(node)
+                        )
                     taken = test != 0
                     at = at.but(draws=scope.draws)
                     self._walk(node.then, at.take(taken))
@@ -252,7 +265,10 @@ class _Derivation:
                 case g.Choose():
                     return self._choose(node, at)
                 case _:
-                    index, at = node.child if not isinstance(node, g.Rule) else node.body, self._operate(index, node, at)
+                    index, at = (
+                        node.child if not isinstance(node, g.Rule) else node.body,
+                        self._operate(index, node, at),
+                    )
 
     def _operate(self, index: int, node: g.Node, at: Instances) -> Instances:
         """What a node with one child changes for it."""
@@ -310,9 +326,13 @@ class _Derivation:
         else:
             scope, local = self._scope(at), matrices.identity(len(at))
             for step in node.steps:
-                local = matrices.chain(local, matrices.STEPS[step.operation](*(evaluate(a, scope) for a in step.arguments)))
+                local = matrices.chain(
+                    local, matrices.STEPS[step.operation](*(evaluate(a, scope) for a in step.arguments))
+                )
                 if not np.isfinite(local).all():
-                    raise PlsysError(f"{step.operation} gives a matrix that is not finite", place(step) or place(node))
+                    raise PlsysError(
+                        f"{step.operation} gives a matrix that is not finite", place(step) or place(node)
+                    )
             at = at.but(draws=scope.draws)
         singular = np.broadcast_to(matrices.is_singular(local), len(at))
         at = at.but(matrix=matrices.chain(at.matrix, local))

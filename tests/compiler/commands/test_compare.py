@@ -1,4 +1,5 @@
-"""``plsys compare``: agreement with POV-Ray, the facts and their classes, the picture, exit codes; and the mesh way."""
+"""``plsys compare``: agreement with POV-Ray, the facts and their classes, the picture, exit codes; and the
+mesh way."""
 
 from __future__ import annotations
 
@@ -15,7 +16,9 @@ from plsys.compiler.export.retrace import Retracer
 from plsys.compiler.pipeline import build
 from plsys.runtime import Scene
 
-needs_povray = pytest.mark.skipif(shutil.which("povray") is None, reason="povray isn't installed: apt-get install povray")
+needs_povray = pytest.mark.skipif(
+    shutil.which("povray") is None, reason="povray isn't installed: apt-get install povray"
+)
 
 FACTS = {
     "scene", "width", "height", "pixels", "max_abs", "rmse", "over_1e5", "interior_over_1_255", "edge_pixels",
@@ -53,7 +56,17 @@ def test_without_povray_there_is_a_clear_message(monkeypatch, capsys):
 
 
 def test_a_mesh_is_checked_against_closed_forms(tmp_path, capsys):
-    arguments = ["compare", "scenes/tower.plsys", "--through", "obj", "--size", "64x48", "--tolerance", "0.02", "--json"]
+    arguments = [
+        "compare",
+        "scenes/tower.plsys",
+        "--through",
+        "obj",
+        "--size",
+        "64x48",
+        "--tolerance",
+        "0.02",
+        "--json",
+    ]
     assert main([*arguments, "-o", str(tmp_path / "side.png")]) == 0
     facts = json.loads(capsys.readouterr().out)
     mesh = facts["mesh"]
@@ -64,7 +77,7 @@ def test_a_mesh_is_checked_against_closed_forms(tmp_path, capsys):
     assert (tmp_path / "side.png").exists()
 
 
-# --- statistics, edges, classes ------------------------------------------------------------------------------------------
+# --- statistics, edges, classes ---
 
 
 def flat_image(height: int = 8, width: int = 10) -> dict[str, np.ndarray]:
@@ -111,7 +124,8 @@ def test_statistics_of_known_differences():
 
 
 def test_a_wrong_decision_of_ours_is_called_so():
-    """The retracer confirms what the runtime decides; a runtime that decided otherwise would be told apart."""
+    """The retracer confirms what the runtime decides; a runtime that decided otherwise would be told
+    apart."""
     compilation = build("scenes/tree.plsys", parameters={"order": 5})
     graph = compilation.graph
     camera = Camera(values_of(graph.camera, "camera"), 64, 48)

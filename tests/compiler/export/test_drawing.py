@@ -34,7 +34,10 @@ def test_the_tree_is_the_papers_figure_2_2():
 @pytest.mark.parametrize("scene", SCENES)
 def test_without_the_back_edges_there_is_no_cycle(scene):
     picture = picture_of(scene)
-    below = {i: [e.target for e in picture.edges if e.source == i and not e.is_back] for i in range(len(picture.nodes))}
+    below = {
+        i: [e.target for e in picture.edges if e.source == i and not e.is_back]
+        for i in range(len(picture.nodes))
+    }
     placed = layout(picture, [(16, 40)] * len(picture.nodes), len)
     assert all(placed.layer[i] < placed.layer[child] for i, children in below.items() for child in children)
 

@@ -1,4 +1,5 @@
-"""The POV-Ray export: what stands in the file, that POV-Ray draws it as we do, and that it is written whole or not at all."""
+"""The POV-Ray export: what stands in the file, that POV-Ray draws it as we do, and that it is written whole
+or not at all."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ light_source { <4, -8, 9> color rgb 1 }
 #declare Lacquer = texture { pigment { color rgb <0.8, 0.2, 0.1> } finish { phong 0.4 } }
 """
 
-needs_povray = pytest.mark.skipif(shutil.which("povray") is None, reason="povray isn't installed: apt-get install povray")
+needs_povray = pytest.mark.skipif(
+    shutil.which("povray") is None, reason="povray isn't installed: apt-get install povray"
+)
 
 
 def exported(text: str, tmp_path, **parameters: float) -> str:
@@ -47,7 +50,10 @@ def test_one_union_a_texture_and_short_forms_where_the_transform_allows(tmp_path
         ("[ trans 1 2 3; rotz 90; scale 2 ] sphere", "sphere{<1.0,2.0,3.0>,2.0}"),
         ("[ scale 1 2 3 ] sphere", "sphere{0,1 matrix<1.0,0.0,0.0,0.0,2.0,0.0,0.0,0.0,3.0,0.0,0.0,0.0>}"),
         ("[ trans 0 0 1; scale 2 2 5 ] cylinder", "cylinder{<0.0,0.0,1.0>,<0.0,0.0,6.0>,2.0}"),
-        ("[ scale 1 2 1 ] cylinder", "cylinder{0,z,1 matrix<1.0,0.0,0.0,0.0,2.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0>}"),
+        (
+            "[ scale 1 2 1 ] cylinder",
+            "cylinder{0,z,1 matrix<1.0,0.0,0.0,0.0,2.0,0.0,0.0,0.0,1.0,0.0,0.0,0.0>}",
+        ),
         ("[ scale 2 2 1 ] cone(0.25)", "cone{<0.0,0.0,0.0>,2.0,<0.0,0.0,1.0>,0.5}"),
         ("[ trans 1 0 0; scale -2 3 1 ] box", "box{<-1.0,0.0,0.0>,<1.0,3.0,1.0>}"),
         ("[ rotz 90 ] box", "box{<-1.0,0.0,0.0>,<0.0,1.0,1.0>}"),
@@ -133,7 +139,9 @@ EVERY_SHAPE = [
 @pytest.mark.povray
 def test_povray_draws_every_shape_as_we_do(tmp_path):
     """All on one chart, three rows of six; a pixel or two may lie on an edge to the last bit."""
-    terms = [f"[ trans {3 * (i % 6) - 7.5} 0 {3 * (i // 6) - 3} ] {body}" for i, body in enumerate(EVERY_SHAPE)]
+    terms = [
+        f"[ trans {3 * (i % 6) - 7.5} 0 {3 * (i // 6) - 3} ] {body}" for i, body in enumerate(EVERY_SHAPE)
+    ]
     text = HEAD.replace("<1, -9, 4>", "<1, -30, 6>")
     text += f"object {{ S texture {{ Lacquer }} rotate <10, 20, 30> }}\nSelection S {{ S -> {' + '.join(terms)}; }}"
     compilation = build(Source.from_text(text))

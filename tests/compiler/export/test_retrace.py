@@ -36,7 +36,9 @@ def test_a_clear_miss_is_decided():
 def test_an_occluder_is_found():
     scene = LIGHT + "sphere { <0, 0, 0>, 1 texture { Dull } }\nsphere { <0, -30, 0>, 3 texture { Dull } }"
     assert verdict_of(scene, (0.1, 0, 0.1)).rays[1].primitive >= 0
-    assert verdict_of(scene.replace("3 texture", "3 no_shadow texture"), (0.1, 0, 0.1)).rays[1].primitive == -1
+    assert (
+        verdict_of(scene.replace("3 texture", "3 no_shadow texture"), (0.1, 0, 0.1)).rays[1].primitive == -1
+    )
 
 
 @pytest.mark.parametrize(
@@ -63,7 +65,9 @@ def test_transparent_things_are_looked_through():
     assert [ray.primitive for ray in verdict_of(scene, (0.1, 0, 0.1)).rays] == [0, 0, 1]
 
 
-@pytest.mark.parametrize("kind, argument", [("sphere", 0), ("cylinder", 0), ("cone", 0.5), ("cone", 0), ("box", 0), ("torus", 0.3)])
+@pytest.mark.parametrize(
+    "kind, argument", [("sphere", 0), ("cylinder", 0), ("cone", 0.5), ("cone", 0), ("box", 0), ("torus", 0.3)]
+)
 def test_roots_lie_on_the_surface(kind, argument):
     random = np.random.default_rng(3)
     o, d = random.normal(size=(2, 200, 3)).astype(LONG)

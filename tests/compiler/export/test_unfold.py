@@ -1,4 +1,5 @@
-"""The unfolder: counts in closed form, derivation order, scopes, random streams, limits, and bounded memory."""
+"""The unfolder: counts in closed form, derivation order, scopes, random streams, limits, and bounded
+memory."""
 
 from __future__ import annotations
 
@@ -9,7 +10,6 @@ from plsys.compiler.export.unfold import unfold
 from plsys.compiler.pipeline import build
 from plsys.compiler.reading.diagnostics import PlsysError
 from plsys.compiler.reading.source import Source
-
 
 
 def graph_of(text: str, **parameters: float):
