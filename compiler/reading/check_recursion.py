@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from .diagnostics import Diagnostics
 from .model import (
+    Apply,
     Assign,
     Branch,
     Calculate,
@@ -22,6 +23,7 @@ from .model import (
     Operand,
     Produce,
     Production,
+    Read,
     Symbol,
 )
 from .walk import Way, decided, draws, is_open, leaves, reached_symbols, reads, seed_of, ways
@@ -29,6 +31,9 @@ from .walk import Way, decided, draws, is_open, leaves, reached_symbols, reads, 
 # An endless recursion is legal iff every way round it contracts, because then a detail cut-off ends it. No back end
 # has one yet. Once one has, the judgement is the forecast's, which knows the matrices of states (graph.contraction).
 CONTRACTING_IS_LEGAL = False
+
+# Guards that stay true for ever when their left side moves this way.
+UNBOUNDED = {"greater": 1, "greater_equal": 1, "less": -1, "less_equal": -1}
 
 
 def check_recursion(model: Model, diagnostics: Diagnostics) -> None:
@@ -142,6 +147,49 @@ def _check_cycle(
         diagnostics.add(
             "counter", span, message, f"change it on the way: [ --{sorted(guards)[0]} ] {symbol.name}"
         )
+        return
+    _check_direction(back, diagnostics)
+
+
+def _check_direction(back: list[tuple[Symbol, Way]], diagnostics: Diagnostics) -> None:
+    """A counter that every way round moves away from the guard that would end the recursion: `++n` under `n > 0`."""
+    for symbol, way in back:
+        for test, needed in way.guards:
+            if not (needed and isinstance(test, Apply) and test.operation in UNBOUNDED):
+                continue
+            counter, bound = test.arguments
+            if not (isinstance(counter, Read) and isinstance(bound, Constant)):
+                continue
+            wrong = UNBOUNDED[test.operation]
+            moves = [_direction(each, counter.parameter) for each in back]
+            if all(move == wrong for move in moves):
+                name = counter.parameter
+                verb, other = ("grows", "--") if wrong > 0 else ("falls", "++")
+                message = (
+                    f"'{name}' only {verb} on every way round, and so this guard never ends the recursion"
+                )
+                span = test.span or symbol.name_span
+                diagnostics.add("counter", span, message, f"count the other way: {other}{name}")
+                return
+
+
+def _direction(back: tuple[Symbol, Way], name: str) -> int | None:
+    """1 or -1 if the way moves the parameter by constants of that sign only, else None."""
+    signs = set()
+    for operator in back[1].operators:
+        for statement in operator.statements if isinstance(operator, Calculate) else ():
+            if isinstance(statement, Assign) and statement.parameter == name:
+                value = statement.value
+                moved = isinstance(value, Apply) and value.operation in ("add", "subtract")
+                if not (
+                    moved and isinstance(value.arguments[0], Read) and value.arguments[0].parameter == name
+                ):
+                    return None
+                amount = value.arguments[1]
+                if not isinstance(amount, Constant) or amount.value == 0:
+                    return None
+                signs.add((1 if amount.value > 0 else -1) * (1 if value.operation == "add" else -1))
+    return signs.pop() if len(signs) == 1 else None
 
 
 def _draws_before(way: Way) -> bool:

@@ -74,7 +74,8 @@ class Items:
         item = self.peek()
         if item is None or isinstance(item, syntax.Block | syntax.MapEntry):
             span = item.span if item is not None else Span(self.span.source, self.span.end, self.span.end)
-            raise Problem("wrong-arguments", span, f"{self.what} needs {needed} here")
+            what = f"a value for {needed}" if needed.startswith("'") else needed
+            raise Problem("wrong-arguments", span, f"{self.what} needs {what} here")
         return self.expressions.value(self.take(), self.scope)  # type: ignore[arg-type]
 
     def number(self, needed: str = "a number") -> Expression:

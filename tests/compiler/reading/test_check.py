@@ -139,6 +139,13 @@ def test_a_counter_that_nothing_changes():
     assert codes(COUNTED.replace("--n; ", "")) == ["counter"]
 
 
+def test_a_counter_that_runs_away():
+    assert codes(COUNTED.replace("--n", "++n")) == ["counter"]
+    assert codes(COUNTED.replace("--n", "n -= 0.5")) == []
+    assert codes(COUNTED.replace("n > 0", "n < 9")) == ["counter"]
+    assert codes(COUNTED.replace("--n", "n = n*0.5 - 1")) == []
+
+
 def test_a_cycle_that_changes_nothing():
     assert codes(COUNTED.replace("[ --n; trans 0 0 1 ] ", "")) == ["identity-cycle"]
 
