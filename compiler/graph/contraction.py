@@ -58,7 +58,9 @@ def _has_growing_cycle(count: int, edges: list[tuple[int, int, float]]) -> bool:
     for _ in range(count + 1):
         changed = False
         for a, b, weight in edges:
-            longer = longest[a] + weight + 1e-12  # a little more, so that a cycle of exactly 1 counts as growing
+            longer = (
+                longest[a] + weight + 1e-12
+            )  # a little more, so that a cycle of exactly 1 counts as growing
             if longer > longest[b]:
                 longest[b], changed = longer, True
         if not changed:

@@ -17,6 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from .. import elementary
+from ..bytecode.layout_rows import LIMITS
 from ..elementary import CHOICE_STREAM, bits, mix, name_hash
 from ..reading.model import Apply, Assign, Constant, Expression, Read
 from ..reading.source import Span
@@ -24,7 +25,7 @@ from . import graph as g
 from .matrices import Matrix, is_finite, matrix_of
 from .rewrite import parts
 
-DRAWS_PER_APPLICATION = 64
+DRAWS_PER_APPLICATION = LIMITS["draws_per_application"]
 MAX_VARIANTS = 2**32
 
 

@@ -8,13 +8,14 @@ Example: ``rand(0) + rand(0) + …`` of 65 terms is ``error[limit]: Tree draws 6
 
 from __future__ import annotations
 
+from ..bytecode.layout_rows import LIMITS
 from ..reading.diagnostics import Diagnostics
 from ..reading.model import Apply, Expression
 from . import graph as g
 from .rewrite import expressions, fixpoint
 
-STACK = 64
-DRAWS_PER_APPLICATION = 64
+STACK = LIMITS["stack"]
+DRAWS_PER_APPLICATION = LIMITS["draws_per_application"]
 
 
 def check_limits(graph: g.Graph, diagnostics: Diagnostics) -> None:

@@ -12,26 +12,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 
+from ..bytecode.layout_rows import LIMITS, OPCODES, SHAPES
 from ..reading.model import Apply, Assign, Constant, Expression, Read, Step, Variants
 from . import graph as g
 from .matrices import STEPS
 from .printing import print_node
 from .rewrite import expressions, parts
 
-# How many arguments operations take. Steps and `hash` are apart.
-ARITY = {
-    1: "negate not abs sign floor ceil round exp log sqrt sin cos tan asin acos rand",
-    2: "add subtract multiply divide modulo less less_equal greater greater_equal equal not_equal and or min max pow atan2",
-    3: "clamp mix select",
+# How many arguments operations take: those that the bytecode has a row for, and those that it has jumps for.
+LAZY = {"and": 2, "or": 2, "select": 3}
+ARGUMENTS = LAZY | {
+    name: row.pops for name, row in OPCODES.items() if row.pushes == 1 and row.pops > 0 and name != "bool"
 }
-ARGUMENTS = {name: count for count, names in ARITY.items() for name in names.split()}
-STEP_ARGUMENTS = dict(
-    trans=3, rotx=1, roty=1, rotz=1, rot=4, scale=3, scale_uniform=1, shear=6, matrix=12
-)  # fmt: skip
-SHAPE_ARGUMENTS = dict(
-    sphere=0, cylinder=0, cone=1, box=0, torus=1, triangle=0, square=0, disc=0, plane=0
-)  # fmt: skip
-HASH_ARGUMENTS = 16
+STEP_ARGUMENTS = {name: OPCODES[name].pops for name in STEPS}
 
 # What a Selection's guards may lead to, and what stands at the top of a scene.
 PRODUCTIONS = (g.Branch, g.Choose, g.Rule, g.Empty)
@@ -104,7 +97,7 @@ RULES: tuple[tuple[type, str, Callable[[g.Graph, g.Node], bool]], ...] = (
     (
         g.Primitive,
         "has a known shape with its arguments",
-        lambda graph, n: SHAPE_ARGUMENTS.get(n.shape) == len(n.arguments),
+        lambda graph, n: _has_shape(n),
     ),
     (g.MeshLeaf, "has a mesh", lambda graph, n: 0 <= n.mesh < len(graph.meshes)),
 )
@@ -179,7 +172,7 @@ def _is_legal_part(part: Expression) -> bool:
     if isinstance(part, Apply):
         count = len(part.arguments)
         return (
-            1 <= count <= HASH_ARGUMENTS
+            1 <= count <= LIMITS["hash_arguments"]
             if part.operation == "hash"
             else ARGUMENTS.get(part.operation) == count
         )
@@ -188,3 +181,7 @@ def _is_legal_part(part: Expression) -> bool:
 
 def _is_legal_step(step: Step) -> bool:
     return step.operation in STEPS and STEP_ARGUMENTS[step.operation] == len(step.arguments)
+
+
+def _has_shape(node: g.Primitive) -> bool:
+    return node.shape in SHAPES and len(SHAPES[node.shape].arguments) == len(node.arguments)

@@ -1,1 +1,6 @@
-"""Makes ``hand_models`` importable from the tests below this folder (pytest puts a conftest's folder on the path)."""
+"""Makes ``hand_models`` (in this folder) and ``random_scenes`` (one above) importable from the tests below."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))

@@ -1,9 +1,12 @@
 """Work out what is constant: expressions, guards, weights and transformations.
 
-before ::                                          after ::
+before ::                                 after ::
 
-    0 branch (2 > 1) then 1 else 3                     0 transform_code T { roty b; scale 0.5 … } -> 2
-    1 transform_code T { roty b; scale 1 / 2 … } -> 2
+    0 symbol A -> 1                           0 symbol A -> 2
+    1 branch (2 > 1) then 2 else 5            2 rule 0 -> 3
+    2 rule 0 -> 3                             3 transform T <0.5 0 0 0 …> -> 4
+    3 transform_code T { scale 1 / 2 } -> 4   4 primitive sphere
+    4 primitive sphere
 
 The values have the runtime's bits (``plsys.compiler.elementary``). ``rand`` is never folded, and nothing that
 draws is removed or doubled. A value that isn't finite stays an expression, for the derivation to report. ``hash``
