@@ -31,6 +31,13 @@ pl_box pl_box_map(const pl_affine *map, const pl_box *box)
     return out;
 }
 
+static bool has_nan(const pl_box *box)
+{
+    for (int axis = 0; axis < 3; axis++)
+        if (isnan(box->lo[axis]) || isnan(box->hi[axis])) return true;
+    return false;
+}
+
 static pl_affine compose(const pl_affine *outer, const pl_item *item)
 {
     pl_affine map = *outer;
@@ -71,6 +78,8 @@ static pl_box mapped_item_box(const pl_states *states, const pl_item *item, cons
             }
             part = pl_box_map(&at, &state->box);
         }
+        /* A composed map may overflow where the normative chain of mapped rays doesn't: no bounds are known then. */
+        if (has_nan(&part)) return pl_box_everything();
         pl_box_join(&box, &part);
     }
     return box;

@@ -58,5 +58,9 @@ pl_reach pl_reach_through(const pl_transform *transform, const pl_reach *below)
     above.gain = m * n * (c + below->gain) + sqrt(lack) / DBL_EPSILON;
     above.base = m * n * (c * (size + tau) + below->gain * tau) + m * below->base + c * (2.0 * m * below->size + tau) +
                  (sqrt(lack) * size + sqrt(lack_move)) / DBL_EPSILON;
+    /* What has left the range of numbers has no bound. */
+    if (isnan(above.gain)) above.gain = INFINITY;
+    if (isnan(above.base)) above.base = INFINITY;
+    if (isnan(above.size)) above.size = INFINITY;
     return above;
 }

@@ -182,7 +182,7 @@ def test_a_derivation_100000_levels_deep_is_traced():
     assert result.primitive.tolist() == [100000, 0] and result.depth.tolist() == [100001, 1]
 
 
-@pytest.mark.parametrize("factor", ["0.3333333333333333", "2"])
+@pytest.mark.parametrize("factor", ["0.3333333333333333", "2", "8"])
 def test_scales_that_leave_the_range_of_numbers_do_no_harm(factor):
     data = chain(1000, f"const 2; const 0; const 0; trans; const {factor}; scale_uniform; end")
     result = hits(data, [[2.0, 0, 9], [-5, 0.5, 0.25], [1e200, 3, 4]], [[0, 0, -1], [1, 0, 0], [-1, 0, 0]])
@@ -235,3 +235,23 @@ def test_equal_subtrees_are_one_state():
         statistics = scene.statistics
     assert statistics["states"] == 203 and statistics["primitives"] is None  # about 2^201
     assert statistics["scene_bytes"] < 1_000_000
+
+
+def test_what_casts_no_shadow_is_still_seen():
+    """A lit floor below a ball: with no_shadow it is as bright as without the ball."""
+    scene = """camera {{ location <0, 9, -1> look_at <0, 0, 4> }} light_source {{ <0, 50, 0> color rgb 1 }}
+        plane {{ <0, 1, 0>, 0 pigment {{ color rgb 1 }} }} {ball}"""
+    balls = ("", "sphere { <0, 3, 4>, 1 }", "sphere { <0, 3, 4>, 1 no_shadow }")
+    images = []
+    for ball in balls:
+        data = compile(scene.format(ball=ball))
+        for accelerator in ACCELERATORS:
+            with Scene(data, accelerator=accelerator) as traced:
+                images.append(traced.render(40, 30, channels=("color", "primitive")))
+        np.testing.assert_array_equal(images[-1]["color"], images[-3]["color"])
+    empty, solid, ghost = images[::3]
+    floor = ghost["primitive"] == 0
+    np.testing.assert_array_equal(solid["primitive"], ghost["primitive"])
+    assert 0 < (~floor).sum() < 1200
+    np.testing.assert_array_equal(ghost["color"][floor], empty["color"][floor])
+    assert (solid["color"][floor] < empty["color"][floor]).any()

@@ -69,7 +69,7 @@ typedef struct answers {
     double t[RAYS], normal[3 * RAYS];
     int64_t primitive[RAYS];
     int32_t symbol[RAYS], rule[RAYS], depth[RAYS];
-    uint8_t occluded[RAYS];
+    uint8_t occluded[RAYS], shadowed[RAYS]; /* shadowed: without what stands below no_shadow */
 } answers;
 
 typedef struct first_hit {
@@ -117,6 +117,20 @@ static void check_tracer(pl_scene *scene, const answers *expected)
     pl_tracer_destroy(tracer);
 }
 
+static void ask_shadows(pl_scene *scene, answers *a)
+{
+    pl_error error;
+    pl_tracer *tracer = pl_tracer_create(scene, &error);
+    for (int i = 0; i < RAYS; i++) {
+        pl_ray ray = {.t_min = 0.0, .t_max = distance[i], .shadow = true};
+        memcpy(ray.origin, origins + 3 * i, sizeof ray.origin);
+        memcpy(ray.direction, directions + 3 * i, sizeof ray.direction);
+        a->shadowed[i] = (uint8_t)pl_trace_any(tracer, &ray, &error);
+        CHECK(a->shadowed[i] <= a->occluded[i]);
+    }
+    pl_tracer_destroy(tracer);
+}
+
 static void ask(pl_scene *scene, answers *a)
 {
     pl_error error;
@@ -124,6 +138,7 @@ static void ask(pl_scene *scene, answers *a)
     CHECK(pl_intersect(scene, RAYS, origins, directions, &hits, &error));
     CHECK(pl_occluded(scene, RAYS, origins, directions, distance, a->occluded, &error));
     for (int i = 0; i < RAYS; i++) CHECK(a->occluded[i] == (a->t[i] < distance[i]));
+    ask_shadows(scene, a);
 }
 
 static uint64_t count_unfolded(pl_scene *scene)
