@@ -119,8 +119,8 @@ ROOTS = {
 
 
 def mesh_roots(o, d, vertices: np.ndarray, triangles: np.ndarray):
-    """One root a triangle; POV-Ray keeps corners in single precision, and so does this."""
-    a, b, c = (np.float32(vertices)[triangles[:, i]].astype(LONG) for i in range(3))
+    """One root a triangle."""
+    a, b, c = (np.asarray(vertices)[triangles[:, i]].astype(LONG) for i in range(3))
     found = []
     for origin, e, f in zip(a, b - a, c - a):
         normal = np.cross(e, f)

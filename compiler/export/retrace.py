@@ -17,6 +17,7 @@ import numpy as np
 
 from ..graph.graph import Graph
 from ..reading.diagnostics import PlsysError
+from ..reading.model import Mesh
 from .closed_forms import bounds
 from .intersect import LONG, ROOTS, mesh_roots, normal
 from .povray import values_of
@@ -84,7 +85,15 @@ class Retracer:
 
     def decide(self, origin: np.ndarray, directions: np.ndarray) -> Verdict:
         """``directions`` (k, 3): the pixel's own ray first, then its neighbours'; ``origin`` (3,)."""
-        verdict = Verdict()
+        verdict = self._decide(origin, directions, [mesh.vertices for mesh in self.meshes])
+        if self.meshes and not verdict.is_ambiguous:
+            single = self._decide(origin, directions, [np.float32(mesh.vertices) for mesh in self.meshes])
+            if [ray.primitive for ray in single.rays] != [ray.primitive for ray in verdict.rays]:
+                verdict.why = "POV-Ray keeps meshes in single precision"
+        return verdict
+
+    def _decide(self, origin: np.ndarray, directions: np.ndarray, vertices: list[np.ndarray]) -> Verdict:
+        verdict, self.vertices = Verdict(), vertices
         if self.scene is not None:
             origins = np.broadcast_to(origin, directions.shape).astype(LONG)
             self._follow(verdict, origins, directions.astype(LONG), level=0, weight=1.0)
@@ -98,7 +107,9 @@ class Retracer:
             return
         directions = directions / _length(directions)
         surface = self._nearest(verdict, *self._hits(origins, directions))
-        verdict.rays.append(Ray(origins[0], directions[0], -1 if surface is None else surface.primitive))
+        # Secondary rays start on a surface, which they must not find again.
+        start = origins[0] + (NEAREST * directions[0] if verdict.rays else 0)
+        verdict.rays.append(Ray(start, directions[0], -1 if surface is None else surface.primitive))
         if surface is None or verdict.is_ambiguous:
             return
         points = origins + surface.distance[:, None] * directions
@@ -212,12 +223,13 @@ class Retracer:
         o, d = (origins - m[:, 3]) @ inverse.T, directions @ inverse.T
         kind, argument = SHAPE_NAMES[int(self.scene.kind[row])], LONG(self.scene.argument[row])
         if kind == "mesh":
-            mesh = self.meshes[int(argument)]
-            return np.array(mesh_roots(o, d, mesh.vertices, mesh.triangles))
+            return np.array(
+                mesh_roots(o, d, self.vertices[int(argument)], self.meshes[int(argument)].triangles)
+            )
         return np.array(ROOTS[kind](o, d, argument))
 
     def _normals(self, surface: _Surface, points: np.ndarray) -> np.ndarray:
-        """Unit normals (k, 3) in the world; flat ones for meshes."""
+        """Unit normals (k, 3) in the world, as shading has them: smooth where a mesh is."""
         m = self.scene.matrix[surface.primitive].astype(LONG)
         inverse = _inverse(m[:, :3])
         local = (points - m[:, 3]) @ inverse.T
@@ -226,13 +238,23 @@ class Retracer:
             self.scene.argument[surface.primitive],
         )
         if kind == "mesh":
-            mesh = self.meshes[int(argument)]
-            a, b, c = np.asarray(mesh.vertices, LONG)[mesh.triangles[surface.part]]
-            own = np.broadcast_to(np.cross(b - a, c - a), points.shape)
+            own = _mesh_normals(self.meshes[int(argument)], surface.part, local)
         else:
             own = normal(kind, surface.part, local, LONG(argument))
         world = own @ inverse
         return world / _length(world)
+
+
+def _mesh_normals(mesh: Mesh, triangle: int, points: np.ndarray) -> np.ndarray:
+    """The flat normal, or the corners' unit normals weighted by the barycentric coordinates of the points."""
+    a, b, c = np.asarray(mesh.vertices, LONG)[mesh.triangles[triangle]]
+    flat = np.cross(b - a, c - a)
+    if not len(mesh.normals):
+        return np.broadcast_to(flat, points.shape)
+    v = np.cross(points - a, c - a) @ flat / (flat @ flat)
+    w = np.cross(b - a, points - a) @ flat / (flat @ flat)
+    corners = np.asarray(mesh.normals, LONG)[mesh.normal_triangles[triangle]]
+    return np.stack([1 - v - w, v, w], axis=1) @ (corners / _length(corners))
 
 
 def _length(v: np.ndarray) -> np.ndarray:

@@ -160,3 +160,16 @@ def test_a_scene_that_povray_refuses_is_told_with_its_own_words(tmp_path):
     (tmp_path / "bad.pov").write_text("sphere { nonsense }")
     with pytest.raises(PlsysError, match="nonsense"):
         draw(tmp_path / "bad.pov", 8, 6)
+
+
+def test_more_textures_than_unions_are_written_with_their_primitives(tmp_path, monkeypatch):
+    """A scene in which everything has a colour of its own is still written, only longer."""
+    monkeypatch.setattr("plsys.compiler.export.povray.MOST_UNIONS", 5)
+    text = f"""{HEAD}Texture Own {{ pigment {{ color rgb <n/20, rand(0), 0> }} }}
+object {{ S }}
+Selection S {{ C S; if (n > 0) S -> Own (sphere + [ trans 1 0 0 ] sphere) + [ --n; trans 2 0 0 ] S; }}
+Calculation C {{ n = 20; }}"""
+    written = exported(text, tmp_path)
+    assert written.count("union {") == 5
+    assert written.count("object{sphere") == 30
+    assert written.count("sphere{") == 40

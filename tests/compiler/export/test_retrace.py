@@ -86,3 +86,17 @@ def test_roots_lie_on_the_surface(kind, argument):
         "torus": np.abs(np.hypot(r - 1, z) - argument),
     }.get(kind, np.minimum(caps, np.abs(r - (1 + (top - 1) * z))))
     assert off.max() < 1e-12
+
+
+def test_reflections_of_smooth_meshes_use_the_interpolated_normal(tmp_path):
+    """A flat triangle whose normals all lean to the right throws a straight ray to the left of the mirror's own way."""
+    (tmp_path / "leaning.obj").write_text(
+        "v -2 0 -2\nv 2 0 -2\nv 0 0 3\nvn 0.6 -0.8 0\nvn 0.6 -0.8 0\nvn 0.6 -0.8 0\nf 1//1 2//2 3//3\n"
+    )
+    (tmp_path / "scene.plsys").write_text(
+        "object { S texture { pigment { color rgb 0 } finish { reflection 1 } } }\n"
+        'Selection S { S -> mesh("leaning.obj"); }'
+    )
+    retracer = Retracer(build(tmp_path / "scene.plsys").graph)
+    verdict = retracer.decide(np.array([0, -10.0, 0]), np.array([[0, 1.0, 0]]))
+    np.testing.assert_allclose(verdict.rays[1].direction.astype(float), [0.96, -0.28, 0], atol=1e-12)
