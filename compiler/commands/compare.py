@@ -14,7 +14,6 @@ and ours is never wrong. 1: otherwise. 2: no comparison is possible."""
 from __future__ import annotations
 
 import argparse
-import resource
 import sys
 import tempfile
 import time
@@ -58,14 +57,14 @@ def run(arguments: argparse.Namespace) -> int:
         from .through_mesh import run as run_through_mesh
 
         return run_through_mesh(arguments)
-    from ..export.povray_run import find_povray
+    from ..export.povray_run import find_povray, peak_rss
 
     find_povray()
     started = time.perf_counter()
     compilation = build_scene(arguments)
     image, rays_agree, scene = render_ours(compilation.encode(), arguments)
     ours_seconds = time.perf_counter() - started
-    ours_rss = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    ours_rss = peak_rss()
     with scene:
         theirs = _povray(compilation.graph, arguments)
         facts, ours = _compare(compilation.graph, image, theirs.pixels, rays_agree, arguments)

@@ -7,7 +7,6 @@ scene."""
 from __future__ import annotations
 
 import argparse
-import resource
 import tempfile
 import time
 from pathlib import Path
@@ -23,6 +22,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..bytecode.encode import encode
     from ..export.mesh import agrees, export_mesh, read_back
     from ..export.mesh_scene import mesh_graph
+    from ..export.povray_run import peak_rss
     from .compare import render_ours, report
     from .differences import clipped, edges, statistics
 
@@ -31,6 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     image, _, scene = render_ours(compilation.encode(), arguments)
     scene.close()
     ours_seconds = time.perf_counter() - started
+    ours_rss = peak_rss()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / (Path(arguments.scene).stem + ".obj")
         exported = export_mesh(compilation.graph, path, tolerance=arguments.tolerance)
@@ -43,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     facts |= statistics(ours, theirs, edges(image))
     facts |= {
         "ours_seconds": round(ours_seconds, 4),
-        "ours_rss": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+        "ours_rss": ours_rss,
         "mesh": {
             "triangles": read.triangles,
             "tolerance": exported.tolerance,

@@ -21,6 +21,7 @@ import numpy as np
 from ..reading.diagnostics import PlsysError
 
 SETTINGS = ("-A", "-D", "-V", "+FN16", "File_Gamma=1.0", "Dither=off")
+POLL_SECONDS = 0.01
 LAST_LINES = 6  # of POV-Ray's messages, shown when it fails
 
 
@@ -68,13 +69,34 @@ def draw(scene: str | Path, width: int, height: int) -> Drawing:
                 stderr=messages,
                 env=_environment(folder),
             )
-            _, status, usage = os.wait4(child.pid, 0)
-            child.returncode = os.waitstatus_to_exitcode(status)
+            rss = _watch(child)
         seconds = time.perf_counter() - started
         if child.returncode != 0 or not image.exists():
             lines = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
             raise PlsysError("POV-Ray can't draw it:\n" + "\n".join(lines[-LAST_LINES:]), str(scene))
-        return Drawing(read_linear16(image), seconds, usage.ru_maxrss * 1024)
+        return Drawing(read_linear16(image), seconds, rss)
+
+
+def _watch(child: subprocess.Popen) -> int:
+    """Waits for the process; its peak memory in bytes. Not from getrusage: that counts what this process had
+    when it forked, too."""
+    rss = 0
+    while child.poll() is None:
+        rss = max(rss, peak_rss(child.pid))
+        time.sleep(POLL_SECONDS)
+    return rss
+
+
+def peak_rss(pid: int | str = "self") -> int:
+    """The most memory a running process ever had resident, in bytes; 0 where the system doesn't tell."""
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return 0
+    for line in status.splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) * 1024
+    return 0
 
 
 def _environment(folder: str) -> dict[str, str]:
