@@ -109,6 +109,15 @@ static bool find_rule_places(pl_scene *scene, pl_error *error)
     return true;
 }
 
+/* What symbols generate: the scene's own shapes, leaves of state 0, don't count. */
+static uint64_t generated(const pl_states *states)
+{
+    const pl_state *root = &states->list[0];
+    uint64_t own = 0;
+    for (uint32_t i = 0; i < root->item_count; i++) own += root->items[i].kind != PL_NODE_ENTER;
+    return root->primitives == UINT64_MAX ? UINT64_MAX : root->primitives - own;
+}
+
 static bool build(pl_scene *scene, pl_error *error)
 {
     double start = pl_seconds();
@@ -125,7 +134,7 @@ static bool build(pl_scene *scene, pl_error *error)
     counts->primitives = UINT64_MAX;
     if (accel->states) {
         const pl_state *root = &scene->states.list[0];
-        counts->primitives = root->primitives;
+        counts->primitives = generated(&scene->states);
         counts->singular = root->singular;
         counts->depth = root->depth;
         counts->states = scene->states.count - 1; /* the scene itself is none */

@@ -272,7 +272,7 @@ class Scene:
     def statistics(self) -> dict:
         """Counts and costs so far.
 
-        primitives (None: more than 2⁶⁴ or unknown, as without states), states, depth (symbols on a path), scene_bytes,
+        primitives (that symbols generate; None: more than 2⁶⁴, or unknown as without states), states, depth (symbols on a path), scene_bytes,
         singular (dropped subtrees), box_tests, primitive_tests, bailout, trace_level, rays {primary, shadow, reflection,
         transmitted}, seconds {verify, build, trace}, accelerator, threads.
         """

@@ -134,6 +134,7 @@ def test_counts_equal_closed_forms(scene, parameters, count):
     assert sum(int(np.count_nonzero(batch.symbol >= 0)) for batch in unfold(compilation.graph)) == count
     with Scene(compilation.encode()) as traced:
         assert sum(int(np.count_nonzero(batch.symbol >= 0)) for batch in traced.unfold()) == count
+        assert traced.statistics["primitives"] == count
 
 
 def test_the_tree_has_thirteen_states():

@@ -110,7 +110,7 @@ PL_API bool pl_render(pl_scene *scene, const pl_render_options *options, const p
 
 /* Counts and costs so far. */
 typedef struct pl_statistics {
-    uint64_t primitives; /* all of the scene's, UINT64_MAX when more or unknown */
+    uint64_t primitives; /* that symbols generate (the scene's own objects don't count); UINT64_MAX: more, or unknown */
     uint64_t states;
     uint64_t depth;        /* most symbols entered on a path */
     uint64_t scene_bytes;  /* program, states and accelerator */
