@@ -21,6 +21,7 @@ COMMANDS = {
     "compare": "draw a scene here and in POV-Ray and compare the pictures",
     "graph": "draw the cyclic object-instancing graph (.svg, .dot)",
     "disassemble": "show the bytecode as text",
+    "lsp": "the language server, for editors",
 }
 
 EPILOG = """\

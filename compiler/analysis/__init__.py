@@ -1,0 +1,32 @@
+"""The façade of the compiler for editors: what a file says at a place, at typing speed.
+
+Files are :class:`Document`\\ s in a :class:`Project`; a document is a list of blocks, each with a syntax tree, names and
+messages of its own, so that an edit costs what it touched (text, split, facts, scene). All offsets are bytes.
+
+Example::
+
+    from plsys.compiler.analysis import Project
+
+    project = Project()
+    document = project.open(path, data)
+    scene = project.scene_of(document)
+    project.work()
+    for message in scene.messages(document): …
+    name, place = document.name_at(offset)
+    scene.meaning(name).definitions, scene.uses(name)
+"""
+
+from ..reading import syntax, vocabulary
+from ..reading.codes import CODES
+from ..reading.diagnostics import Diagnostic, PlsysError, nearest
+from ..reading.source import Span
+from .document import Document, Meaning, Message, Outline, Place
+from .facts import Definition, Facts, Name, facts_of
+from .project import Project
+from .scene import Scene
+from .text import Block, Change, Text
+
+__all__ = [
+    "CODES", "Block", "Change", "Definition", "Diagnostic", "Document", "Facts", "Meaning", "Message", "Name", "Outline",
+    "Place", "PlsysError", "Project", "Scene", "Span", "Text", "facts_of", "nearest", "syntax", "vocabulary",
+]  # fmt: skip

@@ -1,0 +1,139 @@
+"""All files that an editor or a tool looks at: open ones, those that they include, and the scenes that they form.
+
+A file that no other known file includes is a scene of its own; what another includes is looked at as part of that
+scene, where its names mean what they mean to the includer.
+
+Example::
+
+    project = Project()
+    document = project.open(Path("tree.plsys"), b"object { Tree }\\n")
+    project.edit(document, 9, 13, b"Bush")
+    project.work()
+    project.messages(document)
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from .document import Document, Message
+from .scene import Scene
+from .text import Change
+
+
+class Project:
+    def __init__(self) -> None:
+        self.documents: dict[Path | str, Document] = {}
+        self.scenes: dict[Document, Scene] = {}
+
+    # --- files
+
+    def document(self, path: Path) -> Document:
+        """The document of ``path``: as opened, or as it is on disk. Raises OSError."""
+        key = _key(path)
+        found = self.documents.get(key)
+        if found is None:
+            if not path.is_file():
+                raise FileNotFoundError(2, "No such file or directory")
+            found = self.documents[key] = Document(path, path.read_bytes())
+        return found
+
+    def open(self, path: Path | None, data: bytes, version: int | None = 0, name: str = "") -> Document:
+        """The editor opened ``path`` with the text ``data``, which now counts instead of the file. A text without a
+        file has a ``name`` of its own instead."""
+        key = _key(path) if path is not None else name
+        document = self.documents.get(key)
+        if document is None:
+            document = self.documents[key] = Document(path, data, version)
+        else:
+            self._changed(document, document.set(data))
+            document.version = version
+        self._find_scenes()
+        return document
+
+    def close(self, document: Document) -> None:
+        """The editor closed ``document``: from now on the file on disk counts."""
+        document.version = None
+        self.reload(document)
+        self._find_scenes()
+
+    def reload(self, document: Document) -> None:
+        """Read a document that isn't open from disk again."""
+        if document.version is not None or document.path is None:
+            return
+        try:
+            self._changed(document, document.set(document.path.read_bytes()))
+        except OSError:
+            self.documents.pop(_key(document.path), None)
+        self._look_for_includes()
+
+    def file_changed(self, path: Path) -> None:
+        """A file was made, changed or deleted outside of the editor."""
+        document = self.documents.get(_key(path))
+        if document is not None:
+            self.reload(document)
+        else:
+            self._look_for_includes()
+
+    def edit(self, document: Document, start: int, end: int, data: bytes) -> None:
+        self._changed(document, document.edit(start, end, data))
+
+    def _changed(self, document: Document, change: Change) -> None:
+        for scene in list(document.scenes):
+            scene.changed(document, change)
+
+    def _look_for_includes(self) -> None:
+        for scene in list(self.scenes.values()):
+            scene.includes_changed()
+        self._find_scenes()
+
+    # --- scenes
+
+    def _find_scenes(self) -> None:
+        """A scene for each open document that is in none, and none for those that another scene has taken in."""
+        for document in list(self.documents.values()):
+            if document.version is not None and not document.scenes:
+                self.scenes[document] = Scene(document, self.document)
+        for root, scene in list(self.scenes.items()):
+            elsewhere = any(other is not scene for other in root.scenes)
+            unused = all(document.version is None for document in scene.documents)
+            if unused or (elsewhere and not _includes_all(root, scene)):
+                del self.scenes[root]
+                for document in scene.documents:
+                    document.scenes.remove(scene)
+        needed = {document for scene in self.scenes.values() for document in scene.documents}
+        for key, document in list(self.documents.items()):
+            if document.version is None and document not in needed:
+                del self.documents[key]
+
+    def scene_of(self, document: Document) -> Scene:
+        """The scene that ``document`` is looked at in."""
+        if not document.scenes:
+            self._find_scenes()
+        if not document.scenes:  # not open, and nobody includes it
+            self.scenes[document] = Scene(document, self.document)
+        return document.scenes[0]
+
+    # --- work
+
+    def work(self, seconds: float | None = None) -> bool:
+        """Resolve what edits have touched, for at most about ``seconds``; True when all is done."""
+        deadline = None if seconds is None else time.perf_counter() + seconds
+        return all([scene.work(deadline) for scene in self.scenes.values()])
+
+    def messages(self, document: Document) -> list[Message]:
+        return self.scene_of(document).messages(document)
+
+
+def _includes_all(root: Document, scene: Scene) -> bool:
+    """Whether ``root`` and another scene's root include each other: then the older scene stays."""
+    others = [other for other in root.scenes if other is not scene]
+    return all(other.root in scene.documents for other in others) and scene is root.scenes[0]
+
+
+def _key(path: Path) -> Path:
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError):
+        return path

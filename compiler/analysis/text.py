@@ -1,0 +1,236 @@
+"""A file's text as a list of blocks, kept up to date by edits.
+
+A :class:`Block` is a top-level piece of the file with a text of its own; all that is known about it (syntax tree,
+names, messages) has offsets inside of it, so that an edit moves later blocks without touching them. A
+:class:`Text` joins the blocks to a file: it finds a block by offset or line, and an edit splits again only the text
+that it touched.
+
+Example::
+
+    text = Text("tree.plsys", path, b"camera { }\\nobject { Tree }\\n")
+    change = text.replace(20, 24, b"Bush")      # → Change(removed=[Block], added=[Block])
+    text.line_of(11)                            # 1: lines count from 0
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from functools import cached_property
+from itertools import accumulate
+from pathlib import Path
+from typing import NamedTuple
+
+from ..reading.source import Source
+from .split import Piece, Shape, group, split
+
+_LINE_END = re.compile(rb"\r\n|\n|\r")
+
+
+class Block(Source):
+    """One top-level piece of a file: a definition as a rule, or some that can't be told apart.
+
+    A block is never changed; an edit replaces it. ``before`` is the block that it replaced, if it replaced just one,
+    with the edit inside of it as (start, old end, new end)."""
+
+    def __init__(self, name: str, data: bytes, path: Path | None, shape: Shape) -> None:
+        super().__init__(name, data, path)
+        self.__dict__.update(shape=shape, before=None, after=None)
+
+    shape: Shape
+    before: tuple[Block, tuple[int, int, int]] | None
+    after: Block | None  # the block that replaced this one
+
+    @cached_property
+    def line_starts(self) -> list[int]:
+        """Byte offset of each line's first byte in this block."""
+        return [0, *(match.end() for match in _LINE_END.finditer(self.data))]
+
+    @property
+    def line_ends(self) -> int:
+        return len(self.line_starts) - 1
+
+
+class Change(NamedTuple):
+    """Blocks that went and blocks that came, both in text order."""
+
+    removed: list[Block]
+    added: list[Block]
+
+
+class Text:
+    """The bytes of a file. Offsets are bytes, lines and columns count from 0, columns are bytes."""
+
+    def __init__(self, name: str, path: Path | None, data: bytes) -> None:
+        self.name, self.path = name, path
+        self.blocks: list[Block] = []
+        self._loose: list[Block] = []  # blocks with an open brace or comment: an edit further down may end it
+        self._forget()
+        self._put(0, 0, data)
+
+    # --- where things are
+
+    def _forget(self) -> None:
+        self._starts: list[int] | None = None
+        self._lines: list[int] | None = None
+        self._order: dict[Block, int] | None = None
+
+    @property
+    def starts(self) -> list[int]:
+        """Where each block starts, and last the length of the text."""
+        if self._starts is None:
+            self._starts = list(accumulate((len(block.data) for block in self.blocks), initial=0))
+        return self._starts
+
+    @property
+    def first_lines(self) -> list[int]:
+        """The line on which each block starts, and last the file's last line."""
+        if self._lines is None:
+            self._lines = list(accumulate((block.line_ends for block in self.blocks), initial=0))
+        return self._lines
+
+    @property
+    def order(self) -> dict[Block, int]:
+        """Each block's place among the blocks."""
+        if self._order is None:
+            self._order = dict(zip(self.blocks, range(len(self.blocks))))
+        return self._order
+
+    def __len__(self) -> int:
+        return self.starts[-1]
+
+    @property
+    def data(self) -> bytes:
+        """The whole text, joined."""
+        return b"".join([block.data for block in self.blocks])
+
+    def index_at(self, offset: int) -> int:
+        """The index of the block with the byte at ``offset``; at the end of the text, of the last block."""
+        return max(0, min(bisect_right(self.starts, offset) - 1, len(self.blocks) - 1))
+
+    def block_at(self, offset: int) -> tuple[Block, int]:
+        """The block with the byte at ``offset``, and where in the file it starts."""
+        index = self.index_at(offset)
+        return self.blocks[index], self.starts[index]
+
+    def start_of(self, block: Block) -> int | None:
+        """Where ``block`` starts in the file, None if it is no longer part of it."""
+        index = self.order.get(block)
+        return None if index is None else self.starts[index]
+
+    # --- lines
+
+    @property
+    def line_count(self) -> int:
+        return self.first_lines[-1] + 1
+
+    def line_of(self, offset: int) -> int:
+        index = self.index_at(offset)
+        inside = bisect_right(self.blocks[index].line_starts, offset - self.starts[index]) - 1
+        return self.first_lines[index] + max(0, inside)
+
+    def line_start(self, line: int) -> int:
+        """The offset of a line's first byte; of lines past the end, the text's length."""
+        if line >= self.line_count:
+            return len(self)
+        index = min(bisect_right(self.first_lines, line) - 1, len(self.blocks) - 1)
+        return self.starts[index] + self.blocks[index].line_starts[line - self.first_lines[index]]
+
+    def line_bytes(self, line: int) -> bytes:
+        """The text of a line without its line end."""
+        if line >= self.line_count:
+            return b""
+        index = min(bisect_right(self.first_lines, line) - 1, len(self.blocks) - 1)
+        block, inside = self.blocks[index], line - self.first_lines[index]
+        starts = block.line_starts
+        end = starts[inside + 1] if inside + 1 < len(starts) else len(block.data)
+        return block.data[starts[inside] : end].rstrip(b"\r\n")
+
+    def slice(self, start: int, end: int) -> bytes:
+        first, last = self.index_at(start), self.index_at(max(start, end - 1))
+        base = self.starts[first]
+        return b"".join([block.data for block in self.blocks[first : last + 1]])[start - base : end - base]
+
+    # --- edits
+
+    def replace(self, start: int, end: int, data: bytes) -> Change:
+        """Put ``data`` in the place of the bytes from ``start`` to ``end``."""
+        start = max(0, min(start, len(self)))
+        end = max(start, min(end, len(self)))
+        return self._put(start, end, data)
+
+    def _put(self, start: int, end: int, data: bytes) -> Change:
+        # A block's boundaries depend on its own start and on how the block before it ends; so one more block on
+        # each side is split again, and further ones where a brace or comment is open.
+        first, last = self.index_at(start), self.index_at(end)
+        low, high = self._loose_before(max(0, first - 1)), min(len(self.blocks), last + 2)
+        while True:
+            base = self.starts[low]
+            old = b"".join([block.data for block in self.blocks[low:high]])
+            new = old[: start - base] + data + old[end - base :]
+            pieces = split(new)
+            if any(piece.shape.comment for piece in pieces):
+                ends = next((i for i in range(high, len(self.blocks)) if b"*/" in self.blocks[i].data), None)
+                if ends is not None:
+                    high = ends + 1
+                    continue
+            joined, taken = self._joined(pieces, high)
+            if not taken:
+                break
+            high += taken
+        change, head = self._exchange(low, high, [(new[piece.start : piece.end], piece.shape) for piece in joined])
+        if len(change.removed) == len(change.added) == 1:
+            base = self.starts[low + head]  # of the old text
+            _link(change, start - base, end - base, len(data))
+        self._forget()
+        return change
+
+    def _loose_before(self, low: int) -> int:
+        """The first block that must be split again when block ``low`` is: an earlier one with an open comment, or with
+        an open brace that only soft blocks follow."""
+        for block in self._loose:
+            index = self.order[block]
+            if index < low and (block.shape.comment or not any(b.shape.hard for b in self.blocks[index + 1 : low + 1])):
+                return index
+        return low
+
+    def _exchange(self, low: int, high: int, texts: list[tuple[bytes, Shape]]) -> tuple[Change, int]:
+        """Put blocks with ``texts`` in the place of ``blocks[low:high]``, keeping those whose text is the same; also
+        how many at the head were kept."""
+        old = self.blocks[low:high]
+        same = min(len(old), len(texts))
+        head = next((i for i in range(same) if old[i].data != texts[i][0]), same)
+        same -= head
+        tail = next((i for i in range(same) if old[-1 - i].data != texts[-1 - i][0]), same)
+        added = [Block(self.name, data, self.path, shape) for data, shape in texts[head : len(texts) - tail]]
+        removed = old[head : len(old) - tail]
+        self.blocks[low + head : high - tail] = added
+        gone = set(removed)
+        self._loose = [block for block in self._loose if block not in gone]
+        self._loose += [block for block in added if block.shape.depth > 0 or block.shape.comment]
+        return Change(removed, added), head
+
+    def _joined(self, pieces: list[Piece], high: int) -> tuple[list[Piece], int]:
+        """Pieces that belong together as one, and how many of the blocks from ``high`` on belong to them too."""
+        if all(piece.shape.depth <= 0 for piece in pieces):
+            return pieces, 0
+        shapes = [piece.shape for piece in pieces]
+        counts = group([*shapes, *(block.shape for block in self.blocks[high:])])[: len(pieces)]
+        joined: list[Piece] = []
+        for i, count in enumerate(counts):
+            if i + count > len(pieces):
+                return pieces, i + count - len(pieces)
+            if count:
+                shape = shapes[i]
+                for other in shapes[i + 1 : i + count]:
+                    shape = shape.then(other)
+                joined.append(Piece(pieces[i].start, pieces[i + count - 1].end, shape))
+        return joined, 0
+
+
+def _link(change: Change, start: int, end: int, length: int) -> None:
+    """Remember how the one removed block became the one added: by ``length`` bytes in the place of start to end."""
+    (old,), (new,) = change
+    if 0 <= start and end <= len(old.data):
+        new.__dict__["before"] = (old, (start, end, start + length))
+    old.__dict__.update(after=new, before=None)  # one step of history is enough

@@ -1,0 +1,273 @@
+"""One client's session: messages in, messages out, without a transport.
+
+``receive`` takes the protocol's messages as plain JSON and answers through ``send``. Text notifications change the
+documents at once; what follows from them (diagnostics) is done by ``work``, when no message waits, so that the latest
+edit wins.
+
+Example::
+
+    session = Session(send=print)
+    session.receive({"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"capabilities": {}}})
+    # prints {"jsonrpc": "2.0", "id": 1, "result": {"capabilities": …}}
+"""
+
+from __future__ import annotations
+
+import logging
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any, Callable
+
+from plsys.compiler.analysis import Document
+
+from . import features
+from .request import Feature, Request
+from .text import ENCODINGS
+from .workspace import UnknownDocument, Workspace, path_of
+
+logger = logging.getLogger(__name__)
+
+PARSE_ERROR, INVALID_REQUEST, METHOD_NOT_FOUND, INVALID_PARAMS, INTERNAL_ERROR = -32700, -32600, -32601, -32602, -32603
+NOT_INITIALIZED, REQUEST_CANCELLED = -32002, -32800
+
+# How long work() may go on before waiting messages are looked at, in seconds.
+SLICE = 0.008
+
+# Files whose changes on disk matter: scenes, and the meshes that they use.
+WATCHED = ("**/*.plsys", "**/*.obj", "**/*.ply")
+
+
+class Refused(Exception):
+    """Raised by a feature to answer with an error: a code of the protocol and a message for people."""
+
+    def __init__(self, message: str, code: int = INVALID_PARAMS) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def load_features() -> dict[str, Feature]:
+    """The rows of all modules in features/, by method."""
+    found: dict[str, Feature] = {}
+    for module in sorted(each.name for each in iter_modules(features.__path__)):
+        for feature in import_module(f"{features.__name__}.{module}").FEATURES:
+            if feature.method in found:
+                raise ValueError(f"{feature.method} is answered twice")
+            found[feature.method] = feature
+    return found
+
+
+class Session:
+    """``send`` takes a message to the client. ``exit_code`` is None until the client ended the session."""
+
+    def __init__(self, send: Callable[[dict], None]) -> None:
+        self._send = send
+        self.features = load_features()
+        self.workspace = Workspace()
+        self.client: dict[str, Any] = {}
+        self.exit_code: int | None = None
+        self._initialized = self._shut_down = False
+        self._changed: dict[Document, None] = {}  # open documents whose diagnostics may be out of date
+        self._published: dict[str, list[dict]] = {}
+        self._next_id = 0
+        self._notifications: dict[str, Callable[[dict], None]] = {
+            "textDocument/didOpen": self._did_open,
+            "textDocument/didChange": self._did_change,
+            "textDocument/didClose": self._did_close,
+            "workspace/didChangeWatchedFiles": self._did_change_watched_files,
+            "workspace/didChangeWorkspaceFolders": self._did_change_folders,
+            "initialized": self._on_initialized,
+            "exit": self._exit,
+        }
+
+    # --- messages
+
+    def receive(self, message: Any) -> None:
+        """Take one message. Never raises for what it holds."""
+        if not isinstance(message, dict) or not isinstance(message.get("method", ""), str):
+            self._refuse(None, INVALID_REQUEST, "a message is an object with a method")
+            return
+        method, number = message.get("method"), message.get("id")
+        if method is None:
+            return  # an answer to a request of ours; none needs one
+        params = message.get("params")
+        if number is not None:
+            self._request(number, method, params if isinstance(params, dict) else {})
+        elif method in self._notifications and (self._initialized or method == "exit"):
+            try:
+                self._notifications[method](params if isinstance(params, dict) else {})
+            except Exception:
+                logger.exception("%s failed", method)
+
+    def _request(self, number: Any, method: str, params: dict) -> None:
+        if method == "initialize":
+            self._answer(number, self._initialize, params)
+        elif not self._initialized:
+            self._refuse(number, NOT_INITIALIZED, "the first request is initialize")
+        elif self._shut_down:
+            self._refuse(number, INVALID_REQUEST, "the session was shut down")
+        elif method == "shutdown":
+            self._shut_down = True
+            self._reply(number, None)
+        elif (feature := self.features.get(method)) is not None:
+            self._answer(number, lambda given: feature.answer(Request(self.workspace, given, self.client)), params)
+        else:
+            self._refuse(number, METHOD_NOT_FOUND, f"no such method: {method}")
+
+    def _answer(self, number: Any, answer: Callable[[dict], Any], params: dict) -> None:
+        try:
+            result = answer(params)
+        except Refused as error:
+            self._refuse(number, error.code, str(error))
+        except UnknownDocument as error:
+            self._refuse(number, INVALID_PARAMS, f"no such document: {error}")
+        except (KeyError, TypeError, AttributeError, ValueError) as error:
+            logger.exception("a request failed")
+            self._refuse(number, INVALID_PARAMS, f"the request can't be answered: {error!r}")
+        except Exception as error:
+            logger.exception("a request failed")
+            self._refuse(number, INTERNAL_ERROR, f"the request failed: {error!r}")
+        else:
+            self._reply(number, result)
+
+    def _reply(self, number: Any, result: Any) -> None:
+        self._send({"jsonrpc": "2.0", "id": number, "result": result})
+
+    def _refuse(self, number: Any, code: int, message: str) -> None:
+        self._send({"jsonrpc": "2.0", "id": number, "error": {"code": code, "message": message}})
+
+    def refuse_unreadable(self) -> None:
+        """Answer bytes that are no JSON."""
+        self._refuse(None, PARSE_ERROR, "a message is JSON")
+
+    def refuse_cancelled(self, number: Any) -> None:
+        self._refuse(number, REQUEST_CANCELLED, "cancelled")
+
+    def notify(self, method: str, params: Any) -> None:
+        self._send({"jsonrpc": "2.0", "method": method, "params": params})
+
+    def ask(self, method: str, params: Any = None) -> None:
+        """Send the client a request whose answer doesn't matter."""
+        self._next_id += 1
+        self._send({"jsonrpc": "2.0", "id": f"plsys-{self._next_id}", "method": method, "params": params})
+
+    # --- the session's life
+
+    def _initialize(self, params: dict) -> dict:
+        capabilities = params.get("capabilities")
+        self.client = capabilities if isinstance(capabilities, dict) else {}
+        offered = (self.client.get("general") or {}).get("positionEncodings") or ["utf-16"]
+        encoding = next((each for each in ENCODINGS if each in offered), "utf-16")
+        self.workspace = Workspace(encoding)
+        for folder in params.get("workspaceFolders") or []:
+            self._add_folder(folder["uri"])
+        if not self.workspace.folders and params.get("rootUri"):
+            self._add_folder(params["rootUri"])
+        self._initialized = True
+        return {"capabilities": self.capabilities(encoding), "serverInfo": {"name": "plsys"}}
+
+    def capabilities(self, encoding: str) -> dict:
+        result: dict[str, Any] = {
+            "positionEncoding": encoding,
+            "textDocumentSync": {"openClose": True, "change": 2, "save": False},
+            "workspace": {"workspaceFolders": {"supported": True, "changeNotifications": True}},
+        }
+        for feature in self.features.values():
+            if feature.capability:
+                *path, key = feature.capability.split(".")
+                target = result
+                for part in path:
+                    target = target.setdefault(part, {})
+                if isinstance(target.get(key), dict) and isinstance(feature.options, dict):
+                    target[key] = {**target[key], **feature.options}
+                else:
+                    target[key] = feature.options
+        return result
+
+    def _on_initialized(self, params: dict) -> None:
+        dynamic = ((self.client.get("workspace") or {}).get("didChangeWatchedFiles") or {}).get("dynamicRegistration")
+        if dynamic:
+            watchers = [{"globPattern": pattern} for pattern in WATCHED]
+            registration = {"id": "watch", "method": "workspace/didChangeWatchedFiles",
+                            "registerOptions": {"watchers": watchers}}
+            self.ask("client/registerCapability", {"registrations": [registration]})
+
+    def _exit(self, params: dict) -> None:
+        self.exit_code = 0 if self._shut_down else 1
+
+    # --- texts
+
+    def _did_open(self, params: dict) -> None:
+        given = params["textDocument"]
+        document = self.workspace.did_open(given["uri"], given["text"], given["version"])
+        self._touch(document)
+
+    def _did_change(self, params: dict) -> None:
+        given = params["textDocument"]
+        document = self.workspace.did_change(given["uri"], given["version"], params["contentChanges"])
+        if document is not None:
+            self._touch(document)
+
+    def _did_close(self, params: dict) -> None:
+        uri = params["textDocument"]["uri"]
+        document = self.workspace.did_close(uri)
+        if document is not None:
+            self._changed.pop(document, None)
+            self._touch_all()
+        if self._published.pop(uri, None):
+            self.notify("textDocument/publishDiagnostics", {"uri": uri, "diagnostics": []})
+
+    def _did_change_watched_files(self, params: dict) -> None:
+        for change in params["changes"]:
+            self.workspace.file_changed(change["uri"])
+        self._touch_all()
+
+    def _did_change_folders(self, params: dict) -> None:
+        for folder in params["event"].get("removed", ()):
+            self.workspace.folders.pop(folder["uri"], None)
+        for folder in params["event"].get("added", ()):
+            self._add_folder(folder["uri"])
+
+    def _add_folder(self, uri: str) -> None:
+        path = path_of(uri)
+        if path is not None:
+            self.workspace.folders[uri] = path
+
+    # --- what follows from edits
+
+    def _touch(self, document: Document) -> None:
+        """Remember that ``document`` and those that share a scene with it need new diagnostics."""
+        self._changed[document] = None
+        for scene in document.scenes:
+            for other in scene.documents:
+                if other in self.workspace.uris:
+                    self._changed[other] = None
+
+    def _touch_all(self) -> None:
+        for document in self.workspace.uris:
+            self._changed[document] = None
+
+    @property
+    def has_work(self) -> bool:
+        return bool(self._changed)
+
+    def work(self) -> None:
+        """Resolve for a moment what edits touched, and publish what is known. Call it until ``has_work`` is false."""
+        finished = self.workspace.project.work(SLICE)
+        pulls = (self.client.get("textDocument") or {}).get("diagnostic") is not None
+        documents = list(self._changed)
+        if finished:
+            self._changed.clear()
+        if not pulls:
+            for document in documents:
+                self._publish(document)
+
+    def _publish(self, document: Document) -> None:
+        uri = self.workspace.uris.get(document)
+        if uri is None:
+            return
+        found = self.workspace.diagnostics(document)
+        if self._published.get(uri) == found:
+            return
+        self._published[uri] = found
+        params = {"uri": uri, "version": document.version, "diagnostics": found}
+        self.notify("textDocument/publishDiagnostics", params)

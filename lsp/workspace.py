@@ -1,0 +1,158 @@
+"""The documents of a client, by URI, and what the protocol says about them.
+
+A :class:`Workspace` turns the client's notifications into edits of a project, and places into the protocol's ranges
+and locations. It knows nothing of transport, so that tests use it without one.
+
+Example::
+
+    workspace = Workspace("utf-16")
+    workspace.did_open("file:///tree.plsys", "object { Tree }\\n", 1)
+    workspace.did_change("file:///tree.plsys", 2, [{"range": …, "text": "Bush"}])
+    workspace.diagnostics("file:///tree.plsys")
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Iterable
+from urllib.parse import quote, unquote, urlsplit
+
+from plsys.compiler.analysis import Document, Message, Place, Project, Scene
+
+from .text import Positions, encode
+
+# A list of more messages than this helps nobody, and slows down the editor.
+MAX_DIAGNOSTICS = 500
+
+SEVERITY = {"error": 1, "warning": 2, "info": 3}
+UNNECESSARY = {"unused", "unreachable", "unreachable-rule"}
+
+
+class UnknownDocument(Exception):
+    """A request about a document that isn't open and has no file."""
+
+
+class Workspace:
+    """``encoding`` is utf-8, utf-16 or utf-32; ``folders`` are the roots that the client has open."""
+
+    def __init__(self, encoding: str = "utf-16") -> None:
+        self.encoding = encoding
+        self.project = Project()
+        self.folders: dict[str, Path] = {}
+        self.open: dict[str, Document] = {}
+        self.uris: dict[Document, str] = {}
+
+    # --- what the client tells
+
+    def did_open(self, uri: str, text: str, version: int) -> Document:
+        document = self.project.open(path_of(uri), encode(text), version, name=uri)
+        self.open[uri] = document
+        self.uris[document] = uri
+        return document
+
+    def did_change(self, uri: str, version: int, changes: Iterable[dict]) -> Document | None:
+        """Apply the changes in order; each is in the coordinates of the text that the one before left."""
+        document = self.open.get(uri)
+        if document is None:
+            return None
+        for change in changes:
+            edit = Positions(document.text, self.encoding).edit(change)
+            self.project.edit(document, *edit)
+        document.version = version
+        return document
+
+    def did_close(self, uri: str) -> Document | None:
+        document = self.open.pop(uri, None)
+        if document is not None:
+            self.uris.pop(document, None)
+            self.project.close(document)
+        return document
+
+    def file_changed(self, uri: str) -> None:
+        path = path_of(uri)
+        if path is not None and uri not in self.open:
+            self.project.file_changed(path)
+
+    # --- documents and places
+
+    def document(self, uri: str) -> Document:
+        """An open document, or one from disk. Raises UnknownDocument."""
+        found = self.open.get(uri)
+        if found is not None:
+            return found
+        path = path_of(uri)
+        try:
+            if path is None:
+                raise OSError
+            return self.project.document(path)
+        except OSError:
+            raise UnknownDocument(uri) from None
+
+    def scene(self, document: Document) -> Scene:
+        return self.project.scene_of(document)
+
+    def uri(self, document: Document) -> str:
+        return self.uris.get(document) or uri_of(document.path)
+
+    def uri_of(self, path: Path) -> str:
+        """The URI of a path: the client's own where the file is open."""
+        return next((uri for document, uri in self.uris.items() if document.path == path), None) or uri_of(path)
+
+    def positions(self, document: Document) -> Positions:
+        return Positions(document.text, self.encoding)
+
+    def range(self, place: Place) -> dict:
+        return self.positions(place.document).range(place.start, place.end)
+
+    def location(self, place: Place) -> dict:
+        """The protocol's Location of ``place``."""
+        return {"uri": self.uri(place.document), "range": self.range(place)}
+
+    # --- diagnostics
+
+    def diagnostics(self, document: Document) -> list[dict]:
+        """The protocol's Diagnostics of ``document``, as far as they are known now."""
+        scene = self.scene(document)
+        messages = scene.messages(document)[:MAX_DIAGNOSTICS]
+        positions = self.positions(document)
+        return [self._diagnostic(scene, positions, message) for message in messages]
+
+    def _diagnostic(self, scene: Scene, positions: Positions, message: Message) -> dict:
+        found = message.diagnostic
+        text = f"{found.message}\n{found.hint}" if found.hint else found.message
+        result = {
+            "range": positions.range(message.start, message.end),
+            "severity": SEVERITY[found.severity],
+            "code": found.code,
+            "source": "plsys",
+            "message": text,
+        }
+        if found.code in UNNECESSARY:
+            result["tags"] = [1]
+        places = [(scene.place(note.span), note.message) for note in found.notes]
+        related = [{"location": self.location(place), "message": said} for place, said in places if place is not None]
+        if related:
+            result["relatedInformation"] = related
+        return result
+
+
+def path_of(uri: str) -> Path | None:
+    """The path of a file URI; None for other schemes and for what is no URI."""
+    try:
+        parts = urlsplit(uri)
+    except ValueError:
+        return None
+    if parts.scheme != "file" or "\0" in unquote(parts.path):
+        return None
+    path = unquote(parts.path)
+    if os.name == "nt":
+        path = path.lstrip("/") if not parts.netloc else f"//{parts.netloc}{path}"
+    return Path(path) if path else None
+
+
+def uri_of(path: Path | None) -> str:
+    if path is None:
+        return "untitled:"
+    text = path.absolute().as_posix()
+    return "file://" + quote(text if text.startswith("/") else "/" + text)
