@@ -1,4 +1,4 @@
-/* bounds.c - boxes of items, states and graph nodes, and finding a primitive's index from its path (state.h). */
+/* bounds.c - boxes of items and states, and finding a primitive's index from its path (state.h). */
 #include "state.h"
 
 /* Items that a box may be computed from, instead of from the box of their state. */
@@ -85,7 +85,7 @@ static pl_box mapped_item_box(const pl_states *states, const pl_item *item, cons
     return box;
 }
 
-static pl_reach leaf_reach(const pl_states *states, const pl_item *item)
+pl_reach pl_item_reach(const pl_states *states, const pl_item *item)
 {
     if (item->kind == PL_NODE_ENTER) return states->list[item->what].reach;
     pl_box box = item->kind == PL_NODE_MESH ? *pl_mesh_box(states->meshes[item->what])
@@ -96,29 +96,9 @@ static pl_reach leaf_reach(const pl_states *states, const pl_item *item)
 pl_box pl_item_box(const pl_states *states, const pl_item *item, pl_reach *reach)
 {
     pl_affine identity = pl_affine_identity(), map = compose(&identity, item);
-    *reach = leaf_reach(states, item);
+    *reach = pl_item_reach(states, item);
     for (uint32_t i = item->transform_count; i-- > 0;) *reach = pl_reach_through(item->transforms[i], reach);
     return mapped_item_box(states, item, &map);
-}
-
-void pl_join_node_boxes(pl_states *states, const pl_item *item, const pl_trail_node *trail, uint32_t count)
-{
-    pl_reach reach = leaf_reach(states, item);
-    pl_affine map = pl_affine_identity();
-    uint32_t level = item->transform_count;
-    bool unbounded = pl_item_unbounded(states, item);
-    for (uint32_t i = count; i-- > 0;) {
-        while (level > trail[i].transforms) {
-            const pl_transform *transform = item->transforms[--level];
-            map = pl_affine_multiply(&transform->to_parent, &map);
-            reach = pl_reach_through(transform, &reach);
-        }
-        pl_node_box *node = &states->node_boxes[trail[i].node];
-        pl_box box = mapped_item_box(states, item, &map);
-        pl_box_join(&node->box, &box);
-        pl_reach_join(&node->reach, &reach);
-        node->unbounded = node->unbounded || unbounded || !(pl_box_is_empty(&box) || pl_box_is_finite(&box));
-    }
 }
 
 /* The item of a state whose terms stand at path[at …]; items are in path order. */

@@ -340,12 +340,7 @@ static void finish_state(builder *b, const visit *v)
     state->depth += state->symbol != UINT32_MAX;
     state->reach.size = fmin(state->reach.size, 1.7320508075688774 * pl_box_reach(&state->box));
     state->on_path = false;
-    if (states->node_boxes && state->symbol != UINT32_MAX) {
-        pl_node_box *node = &states->node_boxes[state->symbol];
-        pl_box_join(&node->box, &state->box);
-        pl_reach_join(&node->reach, &state->reach);
-        node->unbounded = node->unbounded || state->unbounded;
-    }
+    if (states->node_boxes && state->symbol != UINT32_MAX) pl_join_symbol_box(states, v->state);
 }
 
 /* --- exploring --- */

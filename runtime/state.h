@@ -73,6 +73,8 @@ uint64_t pl_states_locate(const pl_states *states, const pl_path *path);
 
 /* The box and reach of an item in its state's frame. */
 pl_box pl_item_box(const pl_states *states, const pl_item *item, pl_reach *reach);
+/* Of an item in its own frame, below its transformations. */
+pl_reach pl_item_reach(const pl_states *states, const pl_item *item);
 bool pl_item_unbounded(const pl_states *states, const pl_item *item);
 uint64_t pl_item_primitives(const pl_states *states, const pl_item *item);
 
@@ -83,6 +85,9 @@ typedef struct pl_trail_node {
 
 /* Joins an item's box into those of the graph nodes on its trail, going outward from the leaf. */
 void pl_join_node_boxes(pl_states *states, const pl_item *item, const pl_trail_node *trail, uint32_t count);
+
+/* The same for a finished state and its S-node. */
+void pl_join_symbol_box(pl_states *states, uint32_t state);
 
 /* Bump allocation within the limit; freed with the states. NULL: error is set. */
 void *pl_states_allocate(pl_states *states, size_t bytes, pl_error *error);
