@@ -129,7 +129,8 @@ def serve_stdio() -> int:
     protocol.set_writer(_Pipe(output))
     gc.collect()
     gc.freeze()
-    asyncio.run(_pump(sys.stdin.buffer, protocol, server.left))
+    # A stream of its own: Python closes sys.stdin at exit, and aborts when a thread still reads it.
+    asyncio.run(_pump(os.fdopen(os.dup(sys.stdin.fileno()), "rb"), protocol, server.left))
     code = protocol.session.exit_code
     return 1 if code is None else code
 

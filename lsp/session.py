@@ -67,7 +67,7 @@ class Session:
         self.exit_code: int | None = None
         self._initialized = self._shut_down = False
         self._changed: dict[Document, None] = {}  # open documents whose diagnostics may be out of date
-        self._published: dict[str, list[dict]] = {}
+        self._published: dict[str, tuple[int | None, list[dict]]] = {}
         self._next_id = 0
         self._notifications: dict[str, Callable[[dict], None]] = {
             "textDocument/didOpen": self._did_open,
@@ -213,7 +213,7 @@ class Session:
         if document is not None:
             self._changed.pop(document, None)
             self._touch_all()
-        if self._published.pop(uri, None):
+        if self._published.pop(uri, (None, []))[1]:
             self.notify("textDocument/publishDiagnostics", {"uri": uri, "diagnostics": []})
 
     def _did_change_watched_files(self, params: dict) -> None:
@@ -266,8 +266,8 @@ class Session:
         if uri is None:
             return
         found = self.workspace.diagnostics(document)
-        if self._published.get(uri) == found:
+        if self._published.get(uri) == (document.version, found):
             return
-        self._published[uri] = found
+        self._published[uri] = document.version, found
         params = {"uri": uri, "version": document.version, "diagnostics": found}
         self.notify("textDocument/publishDiagnostics", params)

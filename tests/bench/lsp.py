@@ -1,0 +1,241 @@
+"""The language server's budgets, measured: bytes in → bytes out over stdio.
+
+`make bench-lsp` prints p50, p99 and the maximum of each kind of request on a generated scene of 10,000 lines, beside its
+budget. Numbers are of this machine and this moment; nothing fails because of them.
+
+Example: ``python tests/bench/lsp.py --lines 10000 --edits 300 --json``
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import sys
+import time
+from pathlib import Path
+from typing import Callable, Iterable
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from tests.lsp.client import Client  # noqa: E402
+
+URI = "untitled:bench.plsys"
+
+BUDGETS_MS = {
+    "start → ready": 1000,
+    "edit → diagnostics": 16,
+    "edit → diagnostics, broken braces": 16,
+    "edit → diagnostics, 100 cursors": 16,
+    "burst of 30 keys/s → diagnostics": 16,
+    "textDocument/hover": 10,
+    "textDocument/definition": 10,
+    "textDocument/signatureHelp": 10,
+    "textDocument/completion": 30,
+    "textDocument/documentHighlight": 10,
+    "textDocument/references": 10,
+    "textDocument/semanticTokens/range": 10,
+    "textDocument/rename": 300,
+    "textDocument/formatting": 300,
+    "textDocument/documentSymbol": 300,
+    "textDocument/foldingRange": 300,
+}
+
+PLANT = """\
+// Plant {i}
+#declare Bark{i} = texture {{ pigment {{ color rgb <0.45, 0.30, 0.15> }} finish {{ ambient 0.1 diffuse 0.7 }} }}
+Selection Tree{i}
+{{
+    C_initialize{i} Tree{i};
+    if (cntTrunk{i} > 0)     Tree{i} -> T_scaleCyl{i} cylinder + C_Trunk{i} T_shiftTrunk{i} Tree{i};
+    else if (cntTree{i} > 0) Tree{i} -> T_scaleCyl{i} cylinder + C_Tree{i} (T_left{i} Tree{i} + T_right{i} Tree{i});
+    else                     Tree{i} -> T_scaleCyl{i} cylinder;
+}}
+Calculation    C_initialize{i} {{ cntTree{i} = order; cntTrunk{i} = 2; betaBr{i} = 60.0; }}
+Calculation    C_Trunk{i}      {{ --cntTrunk{i}; }}
+Calculation    C_Tree{i}       {{ --cntTree{i}; betaBr{i} -= 4.0; }}
+Transformation T_scaleCyl{i}   {{ scale 0.15 0.15 2; }}
+Transformation T_shiftTrunk{i} {{ trans 0 0 1.99; }}
+Transformation T_left{i}       {{ trans 0 0 1.99; roty betaBr{i}; scale 0.8 0.8 0.8; }}
+Transformation T_right{i}      {{ trans 0 0 1.99; roty -betaBr{i}; rotz 90; scale 0.8 0.8 0.8; }}
+object {{ Tree{i}  texture {{ Bark{i} }} translate <{i}, 0, 0> }}
+
+"""
+
+HEAD = """\
+global_settings { assumed_gamma 1.0  seed 7 }
+camera { location <0, -14, 5>  sky <0, 0, 1>  look_at <0, 0, 5>  angle 45 }
+light_source { <20, -30, 40> color rgb 1 }
+Parameter order = 10 [0 to 2000] "Age of the plant";
+"""
+
+
+def generated_scene(lines: int) -> str:
+    """A scene of at least ``lines`` lines without a diagnostic."""
+    plants = -(-(lines - HEAD.count("\n")) // PLANT.count("\n"))
+    return HEAD + "".join(PLANT.format(i=i) for i in range(plants))
+
+
+class Bench:
+    def __init__(self, text: str, seed: int = 1) -> None:
+        self.random = random.Random(seed)
+        self.lines = text.split("\n")
+        self.version = 1
+        self.times: dict[str, list[float]] = {}
+        started = time.perf_counter()
+        self.client = Client()
+        self.capabilities = self.client.initialize()["capabilities"]
+        self.note("start → ready", started)
+        started = time.perf_counter()
+        self.client.open(URI, text)
+        self.diagnostics()
+        self.note("open → diagnostics", started)
+
+    def note(self, what: str, started: float) -> None:
+        self.times.setdefault(what, []).append(1000 * (time.perf_counter() - started))
+
+    def diagnostics(self) -> None:
+        while self.client.wait_for("textDocument/publishDiagnostics").get("version") != self.version:
+            pass
+
+    def edit(self, what: str, changes: Iterable[dict]) -> None:
+        """Edit and wait for the diagnostics of that version."""
+        self.version += 1
+        started = time.perf_counter()
+        self.client.change(URI, self.version, *changes)
+        self.diagnostics()
+        self.note(what, started)
+
+    def request(self, method: str, params: dict) -> None:
+        started = time.perf_counter()
+        answer = self.client.request(method, {"textDocument": {"uri": URI}, **params})
+        self.note(method, started)
+        assert "error" not in answer, answer
+
+    # --- places
+
+    def place(self) -> dict:
+        """A random place in a line of a definition."""
+        while True:
+            line = self.random.randrange(10, len(self.lines) - 2)
+            if len(self.lines[line]) > 30:
+                return {"line": line, "character": self.random.randrange(20, len(self.lines[line]))}
+
+    def name(self) -> dict:
+        """A random place on a name."""
+        while True:
+            place = self.place()
+            text = self.lines[place["line"]]
+            for i in range(place["character"], len(text) - 1):
+                if text[i].isalpha():
+                    return {"line": place["line"], "character": i}
+
+
+def insertion(place: dict, text: str) -> dict:
+    return {"range": {"start": place, "end": place}, "text": text}
+
+
+def deletion(place: dict, length: int) -> dict:
+    return {"range": {"start": place, "end": {**place, "character": place["character"] + length}}, "text": ""}
+
+
+def typing(bench: Bench, count: int, texts: list[str], what: str) -> None:
+    """Type a text somewhere and delete it again."""
+    for _ in range(count // 2):
+        place, text = bench.place(), bench.random.choice(texts)
+        bench.edit(what, [insertion(place, text)])
+        bench.edit(what, [deletion(place, len(text))])
+
+
+def cursors(bench: Bench, count: int) -> None:
+    """One key at 100 places at once."""
+    for _ in range(count // 2):
+        places = sorted({(p["line"], p["character"]) for p in (bench.place() for _ in range(100))}, reverse=True)
+        changes = [{"line": line, "character": character} for line, character in places]
+        bench.edit("edit → diagnostics, 100 cursors", [insertion(place, "x") for place in changes])
+        bench.edit("edit → diagnostics, 100 cursors", [deletion(place, 1) for place in reversed(changes)][::-1])
+
+
+def burst(bench: Bench, count: int) -> None:
+    """Keys at 30 a second; the time from the last one."""
+    for _ in range(count):
+        place = bench.place()
+        for i in range(9):
+            bench.version += 1
+            bench.client.change(URI, bench.version, insertion({**place, "character": place["character"] + i}, "a"))
+            time.sleep(1 / 30)
+        bench.edit("burst of 30 keys/s → diagnostics", [deletion(place, 9)])
+
+
+def requests(bench: Bench, count: int) -> None:
+    """Each request that the server offers, at random places."""
+    offered: list[tuple[str, str, Callable[[], dict]]] = [
+        ("hoverProvider", "textDocument/hover", lambda: {"position": bench.name()}),
+        ("definitionProvider", "textDocument/definition", lambda: {"position": bench.name()}),
+        ("documentHighlightProvider", "textDocument/documentHighlight", lambda: {"position": bench.name()}),
+        ("referencesProvider", "textDocument/references", lambda: {"position": bench.name(), "context": {"includeDeclaration": True}}),
+        ("signatureHelpProvider", "textDocument/signatureHelp", lambda: {"position": bench.place()}),
+        ("completionProvider", "textDocument/completion", lambda: {"position": bench.place()}),
+        ("semanticTokensProvider", "textDocument/semanticTokens/range", lambda: {"range": viewport(bench)}),
+        ("inlayHintProvider", "textDocument/inlayHint", lambda: {"range": viewport(bench)}),
+        ("documentSymbolProvider", "textDocument/documentSymbol", dict),
+        ("foldingRangeProvider", "textDocument/foldingRange", dict),
+        ("documentFormattingProvider", "textDocument/formatting", lambda: {"options": {"tabSize": 4, "insertSpaces": True}}),
+    ]
+    for capability, method, params in offered:
+        if bench.capabilities.get(capability):
+            whole_file = params is dict or method == "textDocument/formatting"
+            for _ in range(5 if whole_file else count):
+                bench.request(method, params())
+    if bench.capabilities.get("renameProvider"):
+        for i in range(5):
+            line = next(i for i, text in enumerate(bench.lines) if text.startswith("Parameter order"))
+            bench.request("textDocument/rename", {"position": {"line": line, "character": 11}, "newName": f"years{i}"})
+
+
+def viewport(bench: Bench) -> dict:
+    line = bench.random.randrange(0, max(1, len(bench.lines) - 60))
+    return {"start": {"line": line, "character": 0}, "end": {"line": line + 60, "character": 0}}
+
+
+def rows(times: dict[str, list[float]]) -> list[dict]:
+    found = []
+    for what, values in times.items():
+        values = sorted(values)
+        found.append({
+            "what": what, "count": len(values), "p50_ms": values[len(values) // 2],
+            "p99_ms": values[min(len(values) - 1, int(0.99 * len(values)))], "max_ms": values[-1], "budget_ms": BUDGETS_MS.get(what),
+        })  # fmt: skip
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--lines", type=int, default=10_000, help="length of the generated scene")
+    parser.add_argument("--scene", type=Path, help="measure on this scene instead")
+    parser.add_argument("--edits", type=int, default=300, help="edits and requests of each kind")
+    parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
+    arguments = parser.parse_args()
+    text = arguments.scene.read_text() if arguments.scene else generated_scene(arguments.lines)
+    bench = Bench(text)
+    typing(bench, arguments.edits, ["a", "1", " ", ";", "sphere ", "C_Tree7 "], "edit → diagnostics")
+    typing(bench, arguments.edits, ["{", "}", "(", "[", '"', "/*"], "edit → diagnostics, broken braces")
+    cursors(bench, max(2, arguments.edits // 10))
+    burst(bench, max(1, arguments.edits // 50))
+    requests(bench, arguments.edits)
+    bench.client.request("shutdown")
+    bench.client.notify("exit")
+    bench.client.process.wait(10)
+    found = rows(bench.times)
+    if arguments.json:
+        print(json.dumps({"lines": len(bench.lines), "rows": found}))
+        return
+    print(f"{len(bench.lines):,} lines; milliseconds, bytes in → bytes out")
+    print(f"{'':42}{'count':>6}{'p50':>9}{'p99':>9}{'max':>9}{'budget':>9}")
+    for row in found:
+        budget = f"{row['budget_ms']:,}" if row["budget_ms"] else ""
+        print(f"{row['what']:42}{row['count']:6}{row['p50_ms']:9.2f}{row['p99_ms']:9.2f}{row['max_ms']:9.2f}{budget:>9}")
+
+
+if __name__ == "__main__":
+    main()
