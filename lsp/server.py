@@ -1,8 +1,7 @@
-"""Wiring: a session on stdio, TCP or a WebSocket.
+"""Wiring: a session on standard input and output (sockets.py has TCP and WebSockets).
 
-pygls serves the sockets and frames what is sent; reading stdin is done here, by a thread, so that the event loop sees
-all messages that wait: a request whose cancellation waits behind it is never begun, and diagnostics are worked out once
-for a burst of edits.
+Reading is done by a thread, so that the event loop sees all messages that wait: a request whose cancellation waits behind
+it is never begun, and diagnostics are worked out once for a burst of edits.
 
 Example: ``serve_stdio()`` returns the process's exit code when the client leaves.
 """
@@ -18,10 +17,7 @@ import re
 import sys
 import threading
 from collections import deque
-from typing import Any, BinaryIO
-
-from pygls.lsp.server import LanguageServer
-from pygls.protocol import LanguageServerProtocol, default_converter
+from typing import Any, BinaryIO, Callable
 
 from .session import Session
 
@@ -31,118 +27,99 @@ _LENGTH = re.compile(rb"content-length:\s*(\d+)\s*$", re.IGNORECASE)
 MAX_MESSAGE_BYTES = 1 << 30
 
 
-class Protocol(LanguageServerProtocol):
-    """pygls' protocol with the session in the place of its handlers: messages stay plain JSON, which is both quicker
-    and more forgiving than classes."""
+class Dispatcher:
+    """The messages of one client that wait, and the session that takes them, one a turn of the event loop. ``write``
+    sends the bytes of a message; ``leave`` is called when the session is over."""
 
-    def __init__(self, server: Any, converter: Any) -> None:
-        super().__init__(server, converter)
+    def __init__(self, write: Callable[[bytes], object], leave: Callable[[], object]) -> None:
+        self.write, self.leave = write, leave
         self.session = Session(self.send)
         self.inbox: deque[Any] = deque()
         self.cancelled: set[Any] = set()
         self._scheduled = False
 
-    def structure_message(self, data: Any) -> Any:
-        return data
-
-    def handle_message(self, message: Any) -> None:
-        """Put a message that was read into the queue. On the event loop's thread."""
+    def deliver(self, body: bytes) -> None:
+        """Take the bytes of a message. On the event loop's thread."""
+        try:
+            message = json.loads(body)
+        except (ValueError, RecursionError):
+            self.session.refuse_unreadable()
+            return
         if isinstance(message, dict) and message.get("method") == "$/cancelRequest":
-            params = message.get("params")
-            number = params.get("id") if isinstance(params, dict) else None
-            if any(isinstance(m, dict) and m.get("id") == number and "method" in m for m in self.inbox):
-                self.cancelled.add(number)
+            self._cancel(message.get("params"))
             return
         self.inbox.append(message)
+        self._schedule()
+
+    def _cancel(self, params: Any) -> None:
+        number = params.get("id") if isinstance(params, dict) else None
+        waiting = (each for each in self.inbox if isinstance(each, dict) and "method" in each)
+        if isinstance(number, int | str) and any(each.get("id") == number for each in waiting):
+            self.cancelled.add(number)
+
+    def _schedule(self) -> None:
         if not self._scheduled:
             self._scheduled = True
-            asyncio.get_running_loop().call_soon(self._drain)
+            asyncio.get_running_loop().call_soon(self._turn)
 
-    def _drain(self) -> None:
-        """Handle the messages that wait, one a turn of the loop; when none does, do the work that edits left."""
+    @property
+    def is_busy(self) -> bool:
+        return bool(self.inbox) or self.session.has_work
+
+    def _turn(self) -> None:
+        """Handle a message; where none waits, do some of the work that edits left."""
         self._scheduled = False
         if self.inbox:
-            message = self.inbox.popleft()
-            number = message.get("id") if isinstance(message, dict) else None
-            if isinstance(number, int | str) and number in self.cancelled:
-                self.cancelled.discard(number)
-                self.session.refuse_cancelled(number)
-            else:
-                self.session.receive(message)
+            self._handle(self.inbox.popleft())
         elif self.session.has_work:
             self.session.work()
         if self.session.exit_code is not None:
             self.leave()
-        elif self.inbox or self.session.has_work:
-            self._scheduled = True
-            asyncio.get_running_loop().call_soon(self._drain)
+        elif self.is_busy:
+            self._schedule()
 
-    def leave(self) -> None:
-        """The client said exit."""
-        self._server.left.set()
+    def _handle(self, message: Any) -> None:
+        number = message.get("id") if isinstance(message, dict) else None
+        if isinstance(number, int | str) and number in self.cancelled:
+            self.cancelled.discard(number)
+            self.session.refuse_cancelled(number)
+            return
+        self.session.receive(message)
+        if isinstance(message, dict) and message.get("method") == "textDocument/didOpen":
+            # A large file is many objects that stay; searching them for garbage takes longer than a key may.
+            gc.freeze()
 
     def send(self, message: dict) -> None:
-        body = json.dumps(message, separators=(",", ":")).encode()
-        if self._include_headers:
-            body = b"Content-Length: %d\r\n\r\n%s" % (len(body), body)
-        if self.writer is None:
-            return
         try:
-            result = self.writer.write(body)
-        except (BrokenPipeError, ConnectionError, ValueError):
+            self.write(json.dumps(message, separators=(",", ":")).encode())
+        except (ConnectionError, ValueError):  # the client is gone
             self.leave()
-            return
-        if asyncio.iscoroutine(result):
-            asyncio.ensure_future(result)
-
-
-class Server(LanguageServer):
-    def __init__(self) -> None:
-        self.left = threading.Event()
-        super().__init__("plsys", "1", protocol_cls=Protocol, converter_factory=default_converter)
-
-    def report_server_error(self, error: Exception, source: Any) -> None:
-        logger.error("%s: %s", source, error)
-
-
-class _Pipe:
-    """Standard output as pygls' writer."""
-
-    def __init__(self, stream: BinaryIO) -> None:
-        self.stream = stream
-
-    def write(self, data: bytes) -> None:
-        self.stream.write(data)
-        self.stream.flush()
-
-    def close(self) -> None:
-        self.stream.close()
 
 
 def serve_stdio() -> int:
     """Serve one client on standard input and output; the exit code."""
-    server = Server()
-    protocol: Protocol = server.protocol  # type: ignore[assignment]
     output = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     # Whatever prints by mistake must not end up among the messages.
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    protocol.set_writer(_Pipe(output))
-    gc.collect()
-    gc.freeze()
     # A stream of its own: Python closes sys.stdin at exit, and aborts when a thread still reads it.
-    asyncio.run(_pump(os.fdopen(os.dup(sys.stdin.fileno()), "rb"), protocol, server.left))
-    code = protocol.session.exit_code
-    return 1 if code is None else code
+    stream = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
+    return asyncio.run(_serve(stream, output))
 
 
-async def _pump(stream: BinaryIO, protocol: Protocol, left: threading.Event) -> None:
+async def _serve(stream: BinaryIO, output: BinaryIO) -> int:
     """Read messages in a thread until the stream ends or the client leaves."""
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
+
+    def write(body: bytes) -> None:
+        output.write(b"Content-Length: %d\r\n\r\n%s" % (len(body), body))
+        output.flush()
+
+    dispatcher = Dispatcher(write, ended.set)
 
     def read() -> None:
         try:
             while (body := read_message(stream)) is not None:
-                loop.call_soon_threadsafe(deliver, body)
+                loop.call_soon_threadsafe(dispatcher.deliver, body)
         except (OSError, ValueError, RuntimeError) as error:
             logger.info("the input ended: %s", error)
         try:
@@ -150,19 +127,14 @@ async def _pump(stream: BinaryIO, protocol: Protocol, left: threading.Event) -> 
         except RuntimeError:
             pass  # the loop is closed already
 
-    def deliver(body: bytes) -> None:
-        try:
-            message = json.loads(body)
-        except (ValueError, RecursionError):
-            protocol.session.refuse_unreadable()
-            return
-        protocol.handle_message(message)
-
+    gc.freeze()
     threading.Thread(target=read, daemon=True, name="stdin").start()
-    protocol.leave = lambda: (left.set(), ended.set())  # type: ignore[method-assign]
     await ended.wait()
-    while not left.is_set() and (protocol.inbox or protocol.session.has_work):
+    while dispatcher.session.exit_code is None and dispatcher.is_busy:
         await asyncio.sleep(0)  # the client closed the pipe: answer what was asked before
+    dispatcher.session.close()
+    code = dispatcher.session.exit_code
+    return 1 if code is None else code
 
 
 def read_message(stream: BinaryIO) -> bytes | None:
@@ -177,13 +149,3 @@ def read_message(stream: BinaryIO) -> bytes | None:
             body = stream.read(length)
             return body if len(body) == length else None
     return None
-
-
-def serve_tcp(host: str, port: int) -> None:
-    """Serve one client that connects to ``host``:``port``."""
-    Server().start_tcp(host, port)
-
-
-def serve_ws(host: str, port: int) -> None:
-    """Serve one client that connects by WebSocket, such as an editor in a browser."""
-    Server().start_ws(host, port)

@@ -194,6 +194,10 @@ class Session:
     def _exit(self, params: dict) -> None:
         self.exit_code = 0 if self._shut_down else 1
 
+    def close(self) -> None:
+        """Let go of what the session holds outside of this process."""
+        self.workspace.close()
+
     # --- texts
 
     def _did_open(self, params: dict) -> None:

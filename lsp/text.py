@@ -53,13 +53,12 @@ def _ends_whole(units: bytes) -> bool:
     return len(units) < 2 or not 0xD8 <= units[-1] <= 0xDB
 
 
-def character_column(line: bytes, column: int, encoding: str) -> int:
-    """How many code units of ``encoding`` the first ``column`` bytes of ``line`` are."""
-    prefix = line[:column]
-    if encoding == "utf-8" or prefix.isascii():
-        return len(prefix)
-    text = prefix.decode(errors="surrogateescape")
-    return len(text) if encoding == "utf-32" else len(text.encode("utf-16-le", "surrogatepass")) // 2
+def units(text: bytes, encoding: str) -> int:
+    """How many code units of ``encoding`` the UTF-8 ``text`` is."""
+    if encoding == "utf-8":
+        return len(text)
+    decoded = text.decode(errors="surrogateescape")
+    return len(decoded) if encoding == "utf-32" else len(decoded.encode("utf-16-le", "surrogatepass")) // 2
 
 
 def encode(text: str) -> bytes:
@@ -82,15 +81,11 @@ class Positions:
         """The offset of a position; one outside of the text is taken to be at its nearest end."""
         if line < 0:
             return 0
-        if line >= self.text.line_count:
-            return len(self.text)
         return self.text.line_start(line) + byte_column(self.text.line_bytes(line), character, self.encoding)
 
     def position(self, offset: int) -> dict:
-        line = self.text.line_of(offset)
-        column = offset - self.text.line_start(line)
-        content = self.text.line_bytes(line)
-        return {"line": line, "character": character_column(content, min(column, len(content)), self.encoding)}
+        line, before = self.text.locate(offset)
+        return {"line": line, "character": len(before) if before.isascii() else units(before, self.encoding)}
 
     def range(self, start: int, end: int) -> dict:
         return {"start": self.position(start), "end": self.position(end)}

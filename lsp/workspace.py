@@ -56,9 +56,8 @@ class Workspace:
         document = self.open.get(uri)
         if document is None:
             return None
-        for change in changes:
-            edit = Positions(document.text, self.encoding).edit(change)
-            self.project.edit(document, *edit)
+        positions = self.positions(document)
+        self.project.edits(document, (positions.edit(change) for change in changes))
         document.version = version
         return document
 
@@ -73,6 +72,9 @@ class Workspace:
         path = path_of(uri)
         if path is not None and uri not in self.open:
             self.project.file_changed(path)
+
+    def close(self) -> None:
+        """The session is over."""
 
     # --- documents and places
 

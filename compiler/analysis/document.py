@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Iterator, NamedTuple
+from typing import TYPE_CHECKING, Iterable, Iterator, NamedTuple
 
 from ..reading import syntax
 from ..reading.diagnostics import Diagnostic
@@ -87,7 +87,23 @@ class Document:
 
     def edit(self, start: int, end: int, data: bytes) -> Change:
         """Put ``data`` in the place of the bytes from ``start`` to ``end``."""
-        change = self.text.replace(start, end, data)
+        return self.edits(((start, end, data),))
+
+    def edits(self, edits: Iterable[tuple[int, int, bytes]]) -> Change:
+        """Several edits one after the other, each in the coordinates that the one before left. ``edits`` may be a
+        generator that looks at the text. The change is that of all together, so that what a block was in between is
+        never read."""
+        removed: dict[Block, None] = {}
+        added: dict[Block, None] = {}
+        for start, end, data in edits:
+            change = self.text.replace(start, end, data)
+            for block in change.removed:
+                if block in added:
+                    del added[block]
+                else:
+                    removed[block] = None
+            added.update(dict.fromkeys(change.added))
+        change = Change(list(removed), list(added))
         self._keep_lost(change)
         return change
 
@@ -119,10 +135,12 @@ class Document:
     def includes(self) -> list[syntax.Include]:
         return [node for block in self.text.blocks for node in facts_of(block).includes]
 
-    def included_paths(self) -> list[tuple[Place, Path]]:
-        """The quoted names of included files with the paths that they stand for."""
+    def included_paths(self, offset: int | None = None) -> list[tuple[Place, Path]]:
+        """The quoted names of included files with the paths that they stand for; only those in the block at
+        ``offset`` where one is given."""
         found = []
-        for block, base in zip(self.text.blocks, self.text.starts):
+        pairs = zip(self.text.blocks, self.text.starts) if offset is None else [self.text.block_at(offset)]
+        for block, base in pairs:
             for node in facts_of(block).includes:
                 path = (self.path.parent if self.path is not None else Path()) / node.path.value
                 found.append((Place(self, base + node.path.span.start, base + node.path.span.end), path))

@@ -53,11 +53,10 @@ class Definition(NamedTuple):
 
 @dataclass
 class Facts:
-    """See the module. ``definitions`` are those that name something; ``blocks`` are scene blocks;
+    """See the module. ``text`` is what was parsed; ``definitions`` are those that name something; ``blocks`` are scene blocks;
     ``assigned`` are the names that get values, in text order; ``ghosts`` are definitions of an earlier text that
     this one has lost to a syntax error."""
 
-    block: Block
     text: bytes
     tree: Tree
     file: syntax.File
@@ -109,7 +108,7 @@ def _read(block: Block) -> Facts:
     text = mistakes.clean(block, diagnostics)
     tree = syntax_tree(text, _old_tree(block))
     file = convert(block, text, tree, diagnostics)
-    return Facts(block, text, tree, file, diagnostics.items)
+    return Facts(text, tree, file, diagnostics.items)
 
 
 def _old_tree(block: Block) -> Tree | None:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from typing import Iterable
 
 from .document import Document, Message
 from .scene import Scene
@@ -77,7 +78,11 @@ class Project:
             self._look_for_includes()
 
     def edit(self, document: Document, start: int, end: int, data: bytes) -> None:
-        self._changed(document, document.edit(start, end, data))
+        self.edits(document, ((start, end, data),))
+
+    def edits(self, document: Document, edits: Iterable[tuple[int, int, bytes]]) -> None:
+        """See Document.edits."""
+        self._changed(document, document.edits(edits))
 
     def _changed(self, document: Document, change: Change) -> None:
         for scene in list(document.scenes):

@@ -64,29 +64,31 @@ class Text:
     def __init__(self, name: str, path: Path | None, data: bytes) -> None:
         self.name, self.path = name, path
         self.blocks: list[Block] = []
+        self._lengths: list[int] = []  # bytes of each block
+        self._line_ends: list[int] = []  # line ends in each block
+        # Sums of the two up to each block. Edits cut them off and lookups extend them, so that many edits from the end
+        # of the file to its start, as of many cursors, sum up once.
+        self._starts, self._lines = [0], [0]
+        self._order: dict[Block, int] | None = None
         self._loose: list[Block] = []  # blocks with an open brace or comment: an edit further down may end it
-        self._forget()
         self._put(0, 0, data)
 
     # --- where things are
 
-    def _forget(self) -> None:
-        self._starts: list[int] | None = None
-        self._lines: list[int] | None = None
-        self._order: dict[Block, int] | None = None
-
     @property
     def starts(self) -> list[int]:
         """Where each block starts, and last the length of the text."""
-        if self._starts is None:
-            self._starts = list(accumulate((len(block.data) for block in self.blocks), initial=0))
+        known = len(self._starts) - 1
+        if known < len(self._lengths):
+            self._starts[known:] = accumulate(self._lengths[known:], initial=self._starts[known])
         return self._starts
 
     @property
     def first_lines(self) -> list[int]:
         """The line on which each block starts, and last the file's last line."""
-        if self._lines is None:
-            self._lines = list(accumulate((block.line_ends for block in self.blocks), initial=0))
+        known = len(self._lines) - 1
+        if known < len(self._line_ends):
+            self._lines[known:] = accumulate(self._line_ends[known:], initial=self._lines[known])
         return self._lines
 
     @property
@@ -106,12 +108,13 @@ class Text:
 
     def index_at(self, offset: int) -> int:
         """The index of the block with the byte at ``offset``; at the end of the text, of the last block."""
-        return max(0, min(bisect_right(self.starts, offset) - 1, len(self.blocks) - 1))
+        starts = self._starts if offset < self._starts[-1] else self.starts
+        return max(0, min(bisect_right(starts, offset) - 1, len(self.blocks) - 1))
 
     def block_at(self, offset: int) -> tuple[Block, int]:
         """The block with the byte at ``offset``, and where in the file it starts."""
         index = self.index_at(offset)
-        return self.blocks[index], self.starts[index]
+        return self.blocks[index], self._starts[index]
 
     def start_of(self, block: Block) -> int | None:
         """Where ``block`` starts in the file, None if it is no longer part of it."""
@@ -124,39 +127,52 @@ class Text:
     def line_count(self) -> int:
         return self.first_lines[-1] + 1
 
-    def line_of(self, offset: int) -> int:
+    def locate(self, offset: int) -> tuple[int, bytes]:
+        """The line with the byte at ``offset``, and that line's text before it."""
         index = self.index_at(offset)
-        inside = bisect_right(self.blocks[index].line_starts, offset - self.starts[index]) - 1
-        return self.first_lines[index] + max(0, inside)
+        block, inside = self.blocks[index], offset - self._starts[index]
+        lines = self._lines if index < len(self._lines) else self.first_lines
+        line = bisect_right(block.line_starts, inside) - 1
+        return lines[index] + line, block.data[block.line_starts[line] : inside].rstrip(b"\r\n")
+
+    def line_of(self, offset: int) -> int:
+        return self.locate(offset)[0]
+
+    def _index_of_line(self, line: int) -> int:
+        lines = self._lines if line < self._lines[-1] else self.first_lines
+        return min(bisect_right(lines, line) - 1, len(self.blocks) - 1)
 
     def line_start(self, line: int) -> int:
         """The offset of a line's first byte; of lines past the end, the text's length."""
-        if line >= self.line_count:
+        index = self._index_of_line(line)
+        inside = line - self._lines[index]
+        starts = self.blocks[index].line_starts
+        if inside >= len(starts):
             return len(self)
-        index = min(bisect_right(self.first_lines, line) - 1, len(self.blocks) - 1)
-        return self.starts[index] + self.blocks[index].line_starts[line - self.first_lines[index]]
+        return (self._starts if index < len(self._starts) else self.starts)[index] + starts[inside]
 
     def line_bytes(self, line: int) -> bytes:
         """The text of a line without its line end."""
-        if line >= self.line_count:
-            return b""
-        index = min(bisect_right(self.first_lines, line) - 1, len(self.blocks) - 1)
-        block, inside = self.blocks[index], line - self.first_lines[index]
+        index = self._index_of_line(line)
+        block, inside = self.blocks[index], line - self._lines[index]
         starts = block.line_starts
+        if inside >= len(starts):
+            return b""
         end = starts[inside + 1] if inside + 1 < len(starts) else len(block.data)
         return block.data[starts[inside] : end].rstrip(b"\r\n")
 
     def slice(self, start: int, end: int) -> bytes:
         first, last = self.index_at(start), self.index_at(max(start, end - 1))
-        base = self.starts[first]
+        base = self._starts[first]
         return b"".join([block.data for block in self.blocks[first : last + 1]])[start - base : end - base]
 
     # --- edits
 
     def replace(self, start: int, end: int, data: bytes) -> Change:
         """Put ``data`` in the place of the bytes from ``start`` to ``end``."""
-        start = max(0, min(start, len(self)))
-        end = max(start, min(end, len(self)))
+        if not 0 <= start <= end < self._starts[-1]:
+            start = max(0, min(start, len(self)))
+            end = max(start, min(end, len(self)))
         return self._put(start, end, data)
 
     def _put(self, start: int, end: int, data: bytes) -> Change:
@@ -165,7 +181,7 @@ class Text:
         first, last = self.index_at(start), self.index_at(end)
         low, high = self._loose_before(max(0, first - 1)), min(len(self.blocks), last + 2)
         while True:
-            base = self.starts[low]
+            base = self._starts[low]
             old = b"".join([block.data for block in self.blocks[low:high]])
             new = old[: start - base] + data + old[end - base :]
             pieces = split(new)
@@ -180,9 +196,8 @@ class Text:
             high += taken
         change, head = self._exchange(low, high, [(new[piece.start : piece.end], piece.shape) for piece in joined])
         if len(change.removed) == len(change.added) == 1:
-            base = self.starts[low + head]  # of the old text
+            base = self._starts[low + head]
             _link(change, start - base, end - base, len(data))
-        self._forget()
         return change
 
     def _loose_before(self, low: int) -> int:
@@ -205,6 +220,10 @@ class Text:
         added = [Block(self.name, data, self.path, shape) for data, shape in texts[head : len(texts) - tail]]
         removed = old[head : len(old) - tail]
         self.blocks[low + head : high - tail] = added
+        self._lengths[low + head : high - tail] = [len(block.data) for block in added]
+        self._line_ends[low + head : high - tail] = [block.line_ends for block in added]
+        del self._starts[low + head + 1 :], self._lines[low + head + 1 :]
+        self._order = None
         gone = set(removed)
         self._loose = [block for block in self._loose if block not in gone]
         self._loose += [block for block in added if block.shape.depth > 0 or block.shape.comment]

@@ -21,16 +21,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     try:
-        from plsys.lsp import server
+        if arguments.tcp is None and arguments.ws is None:
+            from plsys.lsp.server import serve_stdio
+
+            return serve_stdio()
+        from plsys.lsp.sockets import serve_tcp, serve_ws
     except ImportError as error:
-        raise PlsysError(f"the language server can't be loaded ({error}); it needs the package pygls", "plsys lsp") from None
+        raise PlsysError(f"the language server can't be loaded ({error}); sockets need pygls[ws]", "plsys lsp") from None
     try:
         if arguments.tcp is not None:
-            server.serve_tcp(HOST, arguments.tcp)
-        elif arguments.ws is not None:
-            server.serve_ws(HOST, arguments.ws)
+            serve_tcp(HOST, arguments.tcp)
         else:
-            return server.serve_stdio()
+            serve_ws(HOST, arguments.ws)
     except OSError as error:
         raise PlsysError(f"can't serve: {error.strerror or error}", "plsys lsp") from None
     return 0

@@ -24,7 +24,7 @@ def definition(request: Request) -> list[dict[str, Any]]:
 
 
 def _included_file(request: Request) -> dict[str, Any] | None:
-    for place, path in request.document.included_paths():
+    for place, path in request.document.included_paths(request.offset):
         if place.start <= request.offset <= place.end and path.is_file():
             start = {"line": 0, "character": 0}
             return {"uri": request.workspace.uri_of(path), "range": {"start": start, "end": start}}
@@ -33,7 +33,7 @@ def _included_file(request: Request) -> dict[str, Any] | None:
 
 def references(request: Request) -> list[dict[str, Any]]:
     found = request.document.name_at(request.offset)
-    if found is None or request.scene.meaning(found[0]) is None:
+    if found is None or found[0] not in request.scene.entries:
         return []
     declarations = request.params.get("context", {}).get("includeDeclaration", True)
     places = request.scene.uses(found[0])
@@ -42,7 +42,7 @@ def references(request: Request) -> list[dict[str, Any]]:
 
 def highlights(request: Request) -> list[dict[str, Any]]:
     found = request.document.name_at(request.offset)
-    if found is None:
+    if found is None or found[0] not in request.scene.entries:
         return []
     places = [place for place in request.scene.uses(found[0]) if place.document is request.document]
     kinds = {"definition": WRITE, "write": WRITE}

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import json
+import socket
+import subprocess
+import sys
+import time
 
 import pytest
+from plsys.lsp.server import read_message
 from tests.lsp.client import Client
 
 URI = "untitled:scene.plsys"
@@ -99,3 +104,42 @@ def test_the_end_of_input_ends_the_server():
     client.initialize()
     client.process.stdin.close()
     assert client.process.wait(10) == 1
+
+
+@pytest.mark.parametrize("transport", ["--tcp", "--ws"])
+def test_a_session_on_a_socket(transport):
+    """One request and its answer; framing is the transport's."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    process = subprocess.Popen([sys.executable, "-m", "plsys.compiler.cli", "lsp", transport, str(port)])
+    body = json.dumps({"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"capabilities": {}}})
+    try:
+        answer = over_tcp(port, body) if transport == "--tcp" else over_ws(port, body)
+        assert answer["result"]["serverInfo"]["name"] == "plsys"
+    finally:
+        process.kill()
+        process.wait()
+
+
+def until_served(connect):
+    for _ in range(200):
+        try:
+            return connect()
+        except OSError:
+            time.sleep(0.05)
+    raise AssertionError("nothing serves")
+
+
+def over_tcp(port: int, body: str) -> dict:
+    with until_served(lambda: socket.create_connection(("127.0.0.1", port))) as connection:
+        connection.sendall(b"Content-Length: %d\r\n\r\n%s" % (len(body), body.encode()))
+        with connection.makefile("rb") as stream:
+            return json.loads(read_message(stream))
+
+
+def over_ws(port: int, body: str) -> dict:
+    client = pytest.importorskip("websockets.sync.client")
+    with until_served(lambda: client.connect(f"ws://127.0.0.1:{port}")) as connection:
+        connection.send(body)
+        return json.loads(connection.recv(timeout=20))
