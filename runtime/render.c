@@ -119,6 +119,8 @@ static bool check(const pl_scene *scene, const pl_render_options *options, const
     if (options->width < 1 || options->height < 1 || options->width > PL_LIMIT_SIDE || options->height > PL_LIMIT_SIDE)
         return pl_fail(error, PL_ERROR_ARGUMENT, "size", "a picture of %d x %d pixels, not 1 to %d a side",
                        options->width, options->height, PL_LIMIT_SIDE);
+    if (pl_scene_is_empty(scene))
+        return pl_fail(error, PL_ERROR_SCENE, "objects", "the scene has no object, so there is nothing to render");
     return pl_sampler_check(options, error);
 }
 

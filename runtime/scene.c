@@ -213,6 +213,11 @@ uint32_t pl_scene_lights(const pl_scene *scene, const double *const **lights)
     return scene->program->light_count;
 }
 
+bool pl_scene_is_empty(const pl_scene *scene)
+{
+    return scene->program->nodes[0].kind == PL_NODE_EMPTY;
+}
+
 bool pl_scene_all_opaque(const pl_scene *scene)
 {
     return scene->all_opaque;

@@ -77,6 +77,7 @@ pl_counters *pl_tracer_counters(pl_tracer *tracer);
 const double *pl_scene_settings(const pl_scene *scene);
 const double *pl_scene_camera(const pl_scene *scene); /* NULL: the scene has none */
 uint32_t pl_scene_lights(const pl_scene *scene, const double *const **lights);
+bool pl_scene_is_empty(const pl_scene *scene);   /* it places nothing */
 bool pl_scene_all_opaque(const pl_scene *scene); /* no texture filters or transmits, or could */
 bool pl_scene_povray_epsilon(const pl_scene *scene);
 int pl_scene_threads(const pl_scene *scene);

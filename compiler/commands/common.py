@@ -9,12 +9,11 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import sys
-from contextlib import contextmanager
-from pathlib import Path
-from typing import Callable, Iterator
+from typing import Callable
 
-from ..reading.diagnostics import Diagnostic, PlsysError, SceneError, render
+from ..reading.diagnostics import Diagnostic, PlsysError, SceneError, excerpt_at, render
 
 
 def add_scene_arguments(parser: argparse.ArgumentParser, scene_help: str = "a .plsys file") -> None:
@@ -82,27 +81,6 @@ def show_diagnostics(diagnostics) -> None:
         print(render(diagnostic), file=sys.stderr)
 
 
-@contextmanager
-def written_whole(path: str | Path) -> Iterator[Path]:
-    """A temporary name beside ``path`` to write to: renamed to it at the end, removed on any error.
-
-    Fails before any work is done where ``path`` can't be written. The temporary name keeps the suffix, by which
-    image libraries choose the format."""
-    path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        if path.is_dir():
-            raise IsADirectoryError(21, "it is a folder")
-        temporary.touch()
-    except OSError as error:
-        raise PlsysError(f"can't be written: {error.strerror}", str(path)) from None
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
 def print_json(value: object) -> None:
     print(json.dumps(value, indent=2, allow_nan=False))
 
@@ -126,8 +104,10 @@ def report_errors(arguments: argparse.Namespace, run: Callable[[], int]) -> int:
         return 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except RecursionError:
+        _print_error(arguments, "", "the scene is nested too deeply")
     except MemoryError:
-        _print_error(arguments, getattr(arguments, "scene", ""), "there isn't enough memory")
+        _print_error(arguments, "", "there isn't enough memory")
     except Exception as error:
         # The runtime's errors are a family of their own: it knows nothing of the compiler.
         if not (hasattr(error, "place") and hasattr(error, "reason")):
@@ -137,7 +117,16 @@ def report_errors(arguments: argparse.Namespace, run: Callable[[], int]) -> int:
 
 
 def _print_error(arguments: argparse.Namespace, place: str, reason: str) -> None:
-    print(f"{place or 'plsys'}: error: {reason}", file=sys.stderr)
+    """``place`` is file:line:column where the runtime found something in the source; its line is shown then. Other
+    places (``camera``) stand behind the scene's name."""
+    scene = getattr(arguments, "scene", "")
+    found = re.fullmatch(r"(.*):(\d+):(\d+)", place, re.DOTALL)
+    if not found and place in ("", "camera", "objects"):
+        place = scene or "plsys"
+    print(f"{place}: error: {reason}", file=sys.stderr)
+    if found:
+        for line in excerpt_at(found[1], int(found[2]), int(found[3])):
+            print(line, file=sys.stderr)
     _print_json_error(arguments, place, reason, ())
 
 

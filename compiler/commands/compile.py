@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import argparse
 
-from .common import add_scene_arguments, build_scene, print_json, written_whole
+from ..export.files import written_whole
+from .common import add_scene_arguments, build_scene, print_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from ..export.drawing import diagram, dot
-    from ..export.output import whole_file
+    from ..export.files import whole_file
 
     suffix = Path(arguments.output).suffix.lower()
     if suffix not in FORMATS:

@@ -11,8 +11,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..reading.diagnostics import PlsysError
-from .common import written_whole
+from ..export.files import written_whole
+from ..reading.diagnostics import PlsysError, nearest
 
 if TYPE_CHECKING:
     import numpy as np
@@ -64,8 +64,6 @@ def check_format(path: str | Path) -> None:
     writable = set(oiio.get_string_attribute("output_format_list").split(","))
     known = {extension for name, extensions in formats.items() if name in writable for extension in extensions.split(",")}
     if suffix not in known:
-        from ..reading.diagnostics import nearest
-
         hint = nearest(suffix, known) or "use .png, .exr, .tif or .jpg"
         raise PlsysError(f"don't know the picture format '.{suffix}'; {hint}", str(path))
 

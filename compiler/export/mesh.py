@@ -21,7 +21,8 @@ from ..reading.diagnostics import PlsysError
 from .closed_forms import bounds, volumes
 from .matrices import apply, determinant
 from .meshers import MESHERS, Mesher, segments_for
-from .output import Exported, check_size, whole_file
+from .files import whole_file
+from .output import Exported, check_size
 from .textures import Palette, Texture
 from .unfold import SHAPE_NAMES, Instances, unfold
 

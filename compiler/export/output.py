@@ -1,19 +1,17 @@
-"""Files that exist whole or not at all, and what an export has to say about itself.
+"""What an export has to say about itself, and what is too big to be one.
 
 Example::
 
-    with whole_file("tree.pov") as file:      # written under a temporary name, renamed at the end
-        file.write("…")
+    check_size(graph)                    # PlsysError for a scene without end
+    exported = Exported()
+    exported.count(batch)                # primitives by kind
+    exported.lost.append("planes have no end")
 """
 
 from __future__ import annotations
 
-import os
 from collections import Counter
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Iterator, TextIO
 
 from ..graph.forecast import forecast
 from ..graph.graph import Graph
@@ -60,25 +58,3 @@ def check_size(graph: Graph, most_primitives: int = MOST_PRIMITIVES) -> None:
             f"the scene unfolds into {count} primitives; "
             f"an export has at most {most_primitives:,} (max_primitives)"
         )
-
-
-@contextmanager
-def whole_file(path: str | Path) -> Iterator[TextIO]:
-    """A text file to write; it takes the name ``path`` when all is written and leaves nothing behind on an
-    error. PlsysError where ``path`` can't be written."""
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        if path.is_dir():
-            raise IsADirectoryError(21, "it is a folder")
-        file = open(temporary, "w", encoding="utf-8")
-    except OSError as error:
-        raise PlsysError(f"can't be written: {error.strerror}", str(path)) from None
-    try:
-        with file:
-            yield file
-        os.replace(temporary, path)
-    except OSError as error:
-        raise PlsysError(f"can't be written: {error.strerror}", str(path)) from None
-    finally:
-        temporary.unlink(missing_ok=True)

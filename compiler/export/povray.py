@@ -18,7 +18,8 @@ from ..bytecode.layout_rows import RECORDS
 from ..graph.graph import Graph
 from ..reading.model import Record
 from . import povray_text as text
-from .output import Exported, check_size, whole_file
+from .files import whole_file
+from .output import Exported, check_size
 from .textures import Palette, Texture
 from .unfold import unfold
 

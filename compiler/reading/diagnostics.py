@@ -18,11 +18,12 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 from dataclasses import dataclass, field
 from typing import Iterable
 
 from .codes import CODES
-from .source import Span
+from .source import Source, Span
 
 SEVERITIES = ("error", "warning", "info")
 
@@ -122,6 +123,21 @@ def render(diagnostic: Diagnostic) -> str:
     for note in diagnostic.notes:
         lines += [f"{gutter} = {note.span}: {note.message}", *_excerpt(note.span)]
     return "\n".join(lines)
+
+
+def excerpt_at(path: str, line: int, column: int) -> list[str]:
+    """The source line at a place that isn't a span of ours (the runtime's), with carets under the word there; [] if the
+    file can't be read."""
+    try:
+        source = Source.read(path)
+    except OSError:
+        return []
+    if line > len(source.line_starts):
+        return []
+    text = source.line_text(line)
+    start = source.line_starts[line - 1] + len(text[: column - 1].encode())
+    word = re.match(r"\w+|.?", text[column - 1 :])
+    return _excerpt(Span(source, start, start + len(word[0].encode())))
 
 
 def _excerpt(span: Span) -> list[str]:
