@@ -31,15 +31,18 @@ class Dispatcher:
     """The messages of one client that wait, and the session that takes them, one a turn of the event loop. ``write``
     sends the bytes of a message; ``leave`` is called when the session is over."""
 
-    def __init__(self, write: Callable[[bytes], object], leave: Callable[[], object]) -> None:
-        self.write, self.leave = write, leave
-        self.session = Session(self.send)
+    def __init__(
+        self, write: Callable[[bytes], object], leave: Callable[[], object], loop: asyncio.AbstractEventLoop | None = None
+    ) -> None:
+        self.write, self.leave, self.loop = write, leave, loop
+        self.session = Session(self.send, self._wake)
         self.inbox: deque[Any] = deque()
         self.cancelled: set[Any] = set()
         self._scheduled = False
 
     def deliver(self, body: bytes) -> None:
         """Take the bytes of a message. On the event loop's thread."""
+        self.loop = self.loop or asyncio.get_running_loop()
         try:
             message = json.loads(body)
         except (ValueError, RecursionError):
@@ -50,6 +53,11 @@ class Dispatcher:
             return
         self.inbox.append(message)
         self._schedule()
+
+    def _wake(self) -> None:
+        """Results of the whole-file checks wait. In any thread."""
+        if self.loop is not None and not self.loop.is_closed():
+            self.loop.call_soon_threadsafe(self._schedule)
 
     def _cancel(self, params: Any) -> None:
         number = params.get("id") if isinstance(params, dict) else None
@@ -114,7 +122,7 @@ async def _serve(stream: BinaryIO, output: BinaryIO) -> int:
         output.write(b"Content-Length: %d\r\n\r\n%s" % (len(body), body))
         output.flush()
 
-    dispatcher = Dispatcher(write, ended.set)
+    dispatcher = Dispatcher(write, ended.set, loop)
 
     def read() -> None:
         try:

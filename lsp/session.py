@@ -14,11 +14,12 @@ Example::
 from __future__ import annotations
 
 import logging
+from collections import deque
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, Callable
 
-from plsys.compiler.analysis import Document
+from plsys.compiler.analysis import Checker, Document, Result
 
 from . import features
 from .request import Feature, Request
@@ -57,10 +58,14 @@ def load_features() -> dict[str, Feature]:
 
 
 class Session:
-    """``send`` takes a message to the client. ``exit_code`` is None until the client ended the session."""
+    """``send`` takes a message to the client. ``exit_code`` is None until the client ended the session. With ``wake``,
+    whole-file checks run in a process of their own; it is called, in any thread, when their results wait for work()."""
 
-    def __init__(self, send: Callable[[dict], None]) -> None:
+    def __init__(self, send: Callable[[dict], None], wake: Callable[[], None] | None = None) -> None:
         self._send = send
+        self._wake = wake
+        self._results: deque[Result] = deque()
+        self._checker = Checker(self._on_result) if wake is not None else None
         self.features = load_features()
         self.workspace = Workspace()
         self.client: dict[str, Any] = {}
@@ -196,7 +201,8 @@ class Session:
 
     def close(self) -> None:
         """Let go of what the session holds outside of this process."""
-        self.workspace.close()
+        if self._checker is not None:
+            self._checker.close()
 
     # --- texts
 
@@ -242,20 +248,24 @@ class Session:
         """Remember that ``document`` and those that share a scene with it need new diagnostics."""
         self._changed[document] = None
         for scene in document.scenes:
+            if self._checker is not None:
+                self._checker.want(scene)
             for other in scene.documents:
                 if other in self.workspace.uris:
                     self._changed[other] = None
 
     def _touch_all(self) -> None:
         for document in self.workspace.uris:
-            self._changed[document] = None
+            self._touch(document)
 
     @property
     def has_work(self) -> bool:
-        return bool(self._changed)
+        return bool(self._changed or self._results)
 
     def work(self) -> None:
         """Resolve for a moment what edits touched, and publish what is known. Call it until ``has_work`` is false."""
+        while self._results:
+            self._take(self._results.popleft())
         finished = self.workspace.project.work(SLICE)
         pulls = (self.client.get("textDocument") or {}).get("diagnostic") is not None
         documents = list(self._changed)
@@ -264,6 +274,22 @@ class Session:
         if not pulls:
             for document in documents:
                 self._publish(document)
+        if finished and self._checker is not None:
+            self._checker.go()
+
+    def _on_result(self, result: Result) -> None:
+        self._results.append(result)
+        self._wake()
+
+    def _take(self, result: Result) -> None:
+        """Show what the whole-file checks found."""
+        result.apply()
+        for document in result.snapshot.scene.documents:
+            if document in self.workspace.uris:
+                self._changed[document] = None
+        refresh = ((self.client.get("workspace") or {}).get("diagnostics") or {}).get("refreshSupport")
+        if refresh and (self.client.get("textDocument") or {}).get("diagnostic") is not None:
+            self.ask("workspace/diagnostic/refresh")
 
     def _publish(self, document: Document) -> None:
         uri = self.workspace.uris.get(document)

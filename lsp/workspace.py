@@ -73,9 +73,6 @@ class Workspace:
         if path is not None and uri not in self.open:
             self.project.file_changed(path)
 
-    def close(self) -> None:
-        """The session is over."""
-
     # --- documents and places
 
     def document(self, uri: str) -> Document:

@@ -25,8 +25,10 @@ from .facts import Definition, Facts, Name, facts_of
 from .project import Project
 from .scene import Scene
 from .text import Block, Change, Text
+from .whole import Checker, Result
+from .whole import run as check_whole
 
 __all__ = [
-    "CODES", "Block", "Change", "Definition", "Diagnostic", "Document", "Facts", "Meaning", "Message", "Name", "Outline",
-    "Place", "PlsysError", "Project", "Scene", "Span", "Text", "facts_of", "nearest", "syntax", "vocabulary",
+    "CODES", "Block", "Change", "Checker", "Definition", "Diagnostic", "Document", "Facts", "Meaning", "Message", "Name", "Outline",
+    "Place", "PlsysError", "Project", "Result", "Scene", "Span", "Text", "check_whole", "facts_of", "nearest", "syntax", "vocabulary",
 ]  # fmt: skip

@@ -107,6 +107,7 @@ class Scene:
         self.users: dict[str, dict[Block, None]] = {}
         self.singles: dict[str, dict[Block, None]] = {name: {} for name in _SINGLE}
         self.whole: dict[Block, list[Diagnostic]] = {}  # messages of the whole-file checks
+        self.forecast: dict | None = None  # their forecast, of the last text without errors
         self._messages: dict[Block, list[Diagnostic]] = {}  # of resolving
         self._syntax: dict[Block, list[Diagnostic]] = {}
         self._signatures: dict[str, object] = {}

@@ -222,7 +222,7 @@ class _Checker:
         """Definitions of the scene's own file that nothing uses. (Included files are libraries.)"""
         read = self._read_parameters()
         for definition in self.model.definitions.values():
-            if definition.span.source is not self.model.source:
+            if definition.span.source.name != self.model.source.name:
                 continue
             name, what = definition.name, ARTICLES[definition.kind]
             if definition.kind == "parameter":

@@ -12,6 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from plsys.compiler.analysis import check_whole
 from plsys.lsp.session import Session
 
 CURSOR = "<cursor>"
@@ -96,6 +97,12 @@ class Editor:
             self.session.work()
         sent = [m["params"] for m in self.sent if m.get("method") == "textDocument/publishDiagnostics"]
         return next((p["diagnostics"] for p in reversed(sent) if p["uri"] == self.uri(name)), [])
+
+    def checked(self, name: str = "scene.plsys") -> list[dict]:
+        """As ``published``, after the whole-file checks."""
+        document = self.session.workspace.document(self.uri(name))
+        check_whole(self.session.workspace.scene(document))
+        return self.session.workspace.diagnostics(document)
 
     def codes(self, name: str = "scene.plsys") -> list[str]:
         return [each["code"] for each in self.published(name)]

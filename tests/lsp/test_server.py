@@ -99,6 +99,16 @@ def test_a_burst_of_edits_is_answered_for_the_last(client):
         pass
 
 
+def test_whole_file_checks_come_from_their_own_process(client):
+    client.initialize()
+    client.open(URI, "object { A }\nSelection A { A -> [ trans 0 0 1 ] A; }\n")
+    while "endless" not in [each["code"] for each in client.wait_for("textDocument/publishDiagnostics")["diagnostics"]]:
+        pass
+    client.change(URI, 2, insertion(1, 14, "A -> box;"))
+    while "endless" in [each["code"] for each in client.wait_for("textDocument/publishDiagnostics")["diagnostics"]]:
+        pass
+
+
 def test_the_end_of_input_ends_the_server():
     client = Client()
     client.initialize()

@@ -91,3 +91,20 @@ def test_an_included_file_is_seen_as_part_of_its_scene(tmp_path):
     assert editor.codes("lib.plsys") == []
     editor.change("#declare Height = 2;", "", "main.plsys")
     assert editor.codes("lib.plsys") == ["unknown-name"]
+
+
+def test_whole_file_checks_add_what_blocks_alone_do_not_show():
+    editor = Editor("object { A }\nSelection A { A -> [ trans 0 0 1 ] A; }\nCalculation C { n = 1; }\n")
+    assert editor.published() == []
+    assert {each["code"] for each in editor.checked()} >= {"endless", "unused", "no-camera"}
+    editor.change("C { n = 1; }", "C { n = 2; }")
+    assert "unused" not in editor.codes() and "endless" in editor.codes()
+
+
+def test_whole_file_checks_of_included_files(tmp_path):
+    files = {"main.plsys": '#include "lib.plsys"\nobject { A }\n', "lib.plsys": "\nSelection A { A -> [ trans 0 0 1 ] A; }\n"}
+    editor = Editor(files, tmp_path)
+    editor.open("lib.plsys", files["lib.plsys"])
+    editor.checked("main.plsys")
+    (message,) = [each for each in editor.checked("lib.plsys") if each["code"] == "endless"]
+    assert message["range"]["start"] == {"line": 1, "character": 10}
