@@ -12,6 +12,11 @@
 
 #include "../scene.h"
 
+/* Steps that one ray may take: entries of bvh's stack; nodes of a walk. Far beyond any ray that makes sense, it ends
+ * those of scenes in which 2^n equal instances lie in the same place. */
+#define PL_LIMIT_RAY_STEPS (UINT64_C(1) << 24)
+#define PL_LIMIT_WALK_STEPS (UINT64_C(1) << 30)
+
 typedef enum pl_query_kind { PL_QUERY_NEAREST, PL_QUERY_ANY, PL_QUERY_ALL } pl_query_kind;
 
 struct pl_hit_list;
@@ -27,6 +32,9 @@ typedef struct pl_query {
     pl_path *scratch;
     pl_error *error;
 } pl_query;
+
+/* The error of a ray that reached one of the limits on steps; returns false. */
+bool pl_query_fail_steps(const pl_query *query, uint64_t limit);
 
 /* A candidate. path writes its union terms from the root when they are needed. */
 typedef struct pl_leaf {
@@ -53,7 +61,7 @@ struct pl_accel {
     bool (*trace)(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
 };
 
-extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh;
+extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh, pl_accel_grid;
 
 /* One step of the normative chain. */
 static inline void pl_map_ray(const pl_transform *transform, double o[3], double d[3])

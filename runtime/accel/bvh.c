@@ -200,7 +200,8 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     memcpy(root->o, ray->origin, sizeof root->o);
     memcpy(root->d, ray->direction, sizeof root->d);
     if (!begin_frame(tracer->scene, w, 0, 0, query->t_min, query)) return false;
-    while (w->stack_count && !query->done) {
+    for (uint64_t steps = 0; w->stack_count && !query->done; steps++) {
+        if (steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
         pending at = w->stack[--w->stack_count];
         if (at.t_entry > query->t_max) continue;
         w->frame_count = at.frame + 1;

@@ -15,7 +15,7 @@ static bool walk_path(const void *source, pl_path *path)
 bool pl_walk_trace(pl_walk *walk, const pl_scene *scene, pl_counters *counters, const pl_ray *ray, pl_query *query,
                    pl_node_test missed)
 {
-    uint64_t primitive = 0;
+    uint64_t primitive = 0, steps = 0;
     double *o, *d;
     pl_walk_restart(walk, 0, NULL);
     o = walk->at.payload;
@@ -24,6 +24,7 @@ bool pl_walk_trace(pl_walk *walk, const pl_scene *scene, pl_counters *counters, 
     memcpy(d, ray->direction, 3 * sizeof *d);
     while (!query->done) {
         pl_leaf leaf = {.path = walk_path, .source = walk};
+        if (++steps > PL_LIMIT_WALK_STEPS) return pl_query_fail_steps(query, PL_LIMIT_WALK_STEPS);
         switch (pl_walk_next(walk, query->error)) {
         case PL_EVENT_ERROR: return false;
         case PL_EVENT_END: return true;

@@ -6,6 +6,13 @@
 
 #include "../error.h"
 
+bool pl_query_fail_steps(const pl_query *query, uint64_t limit)
+{
+    return pl_fail(query->error, PL_ERROR_LIMIT, "ray",
+                   "work: one ray took more than %llu steps; do very many equal things lie in the same place?",
+                   (unsigned long long)limit);
+}
+
 static bool keep_nearest(pl_query *query, const pl_leaf *leaf, const pl_root *root)
 {
     pl_hit *hit = query->hit;

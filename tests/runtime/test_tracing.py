@@ -12,7 +12,7 @@ from plsys.compiler import compile, elementary
 from plsys.runtime import PlsysRuntimeError, Scene
 
 ROOT = Path(__file__).resolve().parents[2]
-ACCELERATORS = ("none", "boxes", "bvh")
+ACCELERATORS = ("none", "boxes", "grid", "bvh")
 
 
 def hits(data: bytes, origins, directions):
@@ -216,6 +216,25 @@ def test_a_recursion_that_goes_on_too_long_reaches_a_named_limit():
 def test_the_memory_limit_is_named():
     with pytest.raises(PlsysRuntimeError, match="memory: .* more than the 100000 bytes allowed") as caught:
         Scene(chain(100000, "const 0.001; const 0; const 0; trans; end"), memory=100000)
+    assert caught.value.kind == "limit"
+
+
+def test_a_ray_through_too_many_equal_things_reaches_a_named_limit():
+    a = Assembly(["n"])
+    init, test = a.code("const 60; store n; end"), a.code("load n; const 0; greater; end")
+    count = a.code("load n; const 1; subtract; store n; end")
+    a.node("object", name="X", ordinal=0, child=1)
+    a.node("calculate", name="init", code=init, child=2)
+    a.node("enter", symbol=3)
+    a.node("symbol", name="X", live=("n",), draws=0, body=4)
+    a.node("branch", test=test, then=5, otherwise=7)
+    a.node("calculate", name="count", code=count, child=6)
+    a.node("union", children=(2, 2))
+    a.node("primitive", shape="sphere", code=0)
+    with Scene(a.bytes()) as scene:
+        assert scene.statistics["primitives"] == 2**60
+        with pytest.raises(PlsysRuntimeError, match="ray: work: one ray took more than 16777216 steps") as caught:
+            scene.intersect((0, 0, 9), (0, 0, -1))
     assert caught.value.kind == "limit"
 
 

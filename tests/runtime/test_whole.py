@@ -12,7 +12,7 @@ from assembly import one_of_everything
 from plsys.compiler import compile
 
 ROOT = Path(__file__).resolve().parents[2]
-SCENES = ("tree", "tree3d", "mirrors", "shading", "palm")
+SCENES = {"tree": {"order": 5}, "tree3d": {"order": 4}, "mirrors": {}, "shading": {}, "palm": {"rings": 6, "fronds": 4}}
 
 
 @pytest.mark.parametrize("variant", ["plain", "sanitized"])
@@ -25,8 +25,21 @@ def test_shapes(source, variant):
 @pytest.mark.parametrize("variant", ["plain", "sanitized", "threads"])
 @pytest.mark.parametrize("scene", ["everything", *SCENES])
 def test_every_way_of_tracing_gives_the_same_hits(scene, variant, tmp_path):
-    data = one_of_everything().bytes() if scene == "everything" else compile(ROOT / "scenes" / f"{scene}.plsys")
+    data = one_of_everything().bytes() if scene == "everything" else compile(
+        ROOT / "scenes" / f"{scene}.plsys", parameters=SCENES[scene]
+    )
     path = tmp_path / "scene.plsb"
     path.write_bytes(data)
     done = whole.run(whole.program("accel/rays.c", variant), path)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("scene", ["everything", "tree"])
+def test_changed_bytecode_is_refused_or_traced(scene, tmp_path):
+    tree = ROOT / "scenes" / "tree.plsys"
+    path = tmp_path / "scene.plsb"
+    path.write_bytes(one_of_everything().bytes() if scene == "everything" else compile(tree, parameters={"order": 3}))
+    done = whole.run(whole.program("accel/hostile.c", "sanitized"), path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    refused, traced = map(int, done.stdout.split()[1::2])
+    assert refused > 0 and traced > 0 and refused + traced == 8 * (path.stat().st_size - 28)

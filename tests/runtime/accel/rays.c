@@ -3,7 +3,7 @@
  *     rays SCENE.plsb        exit code 0, or lines that say what differs
  *
  * nearest (pl_intersect with 1 and 4 threads) = first of pl_trace_all · pl_occluded = nearest within the distance ·
- * every hit's surface has a unit normal and a texture · the unfolding counts what the states count. */
+ * every hit's surface has a unit normal and a texture · the unfolding counts, of what symbols generate, as much as the states do. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -146,9 +146,10 @@ static uint64_t count_unfolded(pl_scene *scene)
     pl_error error;
     int64_t got;
     uint64_t count = 0;
+    int32_t symbol[BATCH];
     pl_unfolding *unfolding = pl_unfold_begin(scene, &error);
-    while ((got = pl_unfold_next(unfolding, BATCH, NULL, NULL, NULL, NULL, NULL, NULL, &error)) > 0)
-        count += (uint64_t)got;
+    while ((got = pl_unfold_next(unfolding, BATCH, NULL, NULL, NULL, NULL, symbol, NULL, &error)) > 0)
+        for (int64_t i = 0; i < got; i++) count += symbol[i] >= 0;
     CHECK(got == 0);
     pl_unfold_end(unfolding);
     return count;
@@ -160,7 +161,7 @@ int main(int argc, char **argv)
     size_t length;
     if (argc != 2) return 3;
     void *bytes = read_file(argv[1], &length);
-    for (int accelerator = PL_NONE; accelerator <= PL_BVH; accelerator++)
+    for (int accelerator = PL_NONE; accelerator <= PL_GRID; accelerator++)
         for (int threads = 1; threads <= 4; threads += 3) {
             pl_error error;
             pl_options options = {.accelerator = accelerator, .threads = threads};

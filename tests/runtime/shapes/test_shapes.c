@@ -103,7 +103,7 @@ static void check_solids(void)
                   {PL_SHAPE_TORUS, 0.01}, {PL_SHAPE_TORUS, 0.95},   {PL_SHAPE_PLANE, 0.0}};
     double o[3], d[3];
     for (size_t k = 0; k < sizeof solids / sizeof *solids; k++) {
-        for (int i = 0; i < 2000; i++) {
+        for (int i = 0; i < 600; i++) {
             double distance = i % 3 == 0 ? 1.0 : i % 3 == 1 ? 5.0 : 1000.0;
             random_ray(distance, o, d);
             check_solid_ray(solids[k].id, solids[k].argument, o, d, distance);
