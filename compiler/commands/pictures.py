@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..export.files import written_whole
-from ..reading.diagnostics import PlsysError, nearest
+from ..reading.diagnostics import PlsysError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -64,8 +64,7 @@ def check_format(path: str | Path) -> None:
     writable = set(oiio.get_string_attribute("output_format_list").split(","))
     known = {extension for name, extensions in formats.items() if name in writable for extension in extensions.split(",")}
     if suffix not in known:
-        hint = nearest(suffix, known) or "use .png, .exr, .tif or .jpg"
-        raise PlsysError(f"don't know the picture format '.{suffix}'; {hint}", str(path))
+        raise PlsysError(f"don't know the picture format '.{suffix}'; use .png, .jpg, .exr or .tif", str(path))
 
 
 def quantise(values: np.ndarray, maximum: int) -> np.ndarray:

@@ -1,0 +1,188 @@
+"""``plsys render``, ``check``, ``compile``, ``export`` and ``disassemble`` as a user sees them: pictures, JSON, text."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+from plsys.compiler.cli import main
+from plsys.runtime import Scene
+
+TREE = "scenes/tree.plsys"
+SMALL = ["--size", "48x36"]
+
+
+def pixels(path) -> np.ndarray:
+    return np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT))
+
+
+def facts(capsys, *arguments: str) -> dict:
+    assert main([*arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_render_json(tmp_path, capsys):
+    told = facts(capsys, "render", TREE, "-o", str(tmp_path / "t.png"), *SMALL)
+    assert told["scene"] == TREE and (told["width"], told["height"]) == (48, 36)
+    assert told["accelerator"] == "bvh" and told["povray_epsilon"] is False
+    assert told["primitives"] == 2049 and told["states"] == 13
+    assert told["rays"]["primary"] == 48 * 36 and told["rays"]["shadow"] > 0 and told["rays"]["reflection"] == 0
+    assert {"read", "verify", "build", "trace", "write"} <= set(told["seconds"])
+    assert told["memory"]["scene_bytes"] > 0 and told["memory"]["peak_rss_bytes"] > 1e6
+    assert all(set(row) == {"what", "why"} for row in told["left_out"])
+    assert told["image"] == str(tmp_path / "t.png")
+
+
+def test_formats_hold_the_same_picture(tmp_path, capsys):
+    for name in ("a.png", "a.exr", "a.tif"):
+        assert main(["render", TREE, "-o", str(tmp_path / name), *SMALL]) == 0
+    assert main(["render", TREE, "-o", str(tmp_path / "linear.png"), "--linear16", *SMALL]) == 0
+    linear = pixels(tmp_path / "a.exr")
+    np.testing.assert_array_equal(pixels(tmp_path / "a.tif"), linear)
+    np.testing.assert_allclose(pixels(tmp_path / "linear.png"), np.clip(linear, 0, 1), atol=0.51 / 65535)
+    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    np.testing.assert_allclose(pixels(tmp_path / "a.png"), np.clip(srgb, 0, 1), atol=0.51 / 255)
+
+
+def test_the_file_says_where_it_is_from(tmp_path):
+    path = tmp_path / "t.exr"
+    assert main(["render", TREE, "-o", str(path), "-D", "order=3", *SMALL]) == 0
+    spec = oiio.ImageInput.open(str(path)).spec()
+    assert spec.getattribute("Software") == "plsys" and spec.getattribute("plsys:scene") == TREE
+    assert spec.getattribute("plsys:parameters") == "order=3"
+
+
+def test_bytecode_renders_the_same_picture(tmp_path, capsys):
+    compiled, direct, through = tmp_path / "t.plsb", tmp_path / "a.exr", tmp_path / "b.exr"
+    told = facts(capsys, "compile", TREE, "-o", str(compiled))
+    assert told["bytes"] == compiled.stat().st_size <= 1500
+    assert main(["render", TREE, "-o", str(direct), *SMALL]) == 0
+    assert main(["render", str(compiled), "-o", str(through), *SMALL]) == 0
+    np.testing.assert_array_equal(pixels(direct), pixels(through))
+
+
+def test_inputs_change_the_plant(tmp_path, capsys):
+    told = facts(capsys, "render", TREE, "-o", str(tmp_path / "t.png"), "-D", "order=4", *SMALL)
+    assert told["primitives"] == 2 + 2**5 - 1
+    seeds = [tmp_path / f"{seed}.exr" for seed in (1, 2)]
+    for seed, path in zip((1, 2), seeds):
+        assert main(["render", "scenes/tree3d.plsys", "-o", str(path), "--seed", str(seed), *SMALL]) == 0
+    assert not np.array_equal(pixels(seeds[0]), pixels(seeds[1]))
+
+
+def test_extra_channels(tmp_path):
+    path = tmp_path / "t.exr"
+    names = "depth,normal,position,primitive,symbol,rule,recursion,boxes,picture1"
+    assert main(["render", TREE, "-o", str(path), "--aov", names, *SMALL]) == 0
+    channels = {name: layer for name, layer in zip(oiio.ImageBuf(str(path)).spec().channelnames, np.moveaxis(pixels(path), 2, 0))}
+    hit = np.isfinite(channels["Z"]) & (channels["Z"] < 1e30)
+    normal = np.stack([channels[f"N.{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=0)[hit], 1, atol=1e-6)
+    eye = np.array([0, -14, 5])[:, None, None]
+    position = np.stack([channels[f"P.{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose(np.linalg.norm(position - eye, axis=0)[hit], channels["Z"][hit], rtol=1e-5)
+    assert channels["recursion"].max() > 3 and channels["boxes"].max() > 0
+    assert set(np.unique(channels["symbol"][hit])) == {-1, 0}
+
+
+def test_picture_1_colours_the_background_by_recursion_depth(tmp_path):
+    path = tmp_path / "t.png"
+    assert main(["render", TREE, "-o", str(path), "--accel", "boxes", "--aov", "picture1", "--size", "96x72"]) == 0
+    shown = pixels(tmp_path / "t.picture1.png")
+    red, blue = (shown[..., 0] > shown[..., 2]), (shown[..., 2] > shown[..., 0])
+    assert red.sum() > 10 and blue.sum() > 10
+
+
+def test_antialiasing_softens_edges_only(tmp_path):
+    plain, fine = tmp_path / "a.exr", tmp_path / "b.exr"
+    assert main(["render", TREE, "-o", str(plain), *SMALL]) == 0
+    assert main(["render", TREE, "-o", str(fine), "--antialias", "grid=3", *SMALL]) == 0
+    difference = np.abs(pixels(plain) - pixels(fine)).max(axis=2)
+    assert 0.05 < np.mean(difference > 0.01) < 0.9
+
+
+def test_check_json(capsys):
+    told = facts(capsys, "check", TREE, "scenes/menger.plsys")
+    tree, menger = told["files"]
+    assert tree["path"] == TREE and tree["diagnostics"] == []
+    forecast = tree["forecast"]
+    assert forecast["primitives"] == 2049 and forecast["by_kind"] == {"cylinder": 2049}
+    assert forecast["primitives_range"] == {"low": 2049, "expected": 2049, "high": 2049}
+    assert (forecast["states"], forecast["depth"], forecast["infinite"]) == (13, 13, False)
+    assert 0 < forecast["bytecode_bytes"] <= 1500
+    assert menger["forecast"]["primitives"] == 8000
+
+
+def test_large_counts_are_decimal_strings(capsys):
+    told = facts(capsys, "check", TREE, "-D", "order=1000")
+    assert told["files"][0]["forecast"]["primitives"] == str(2 + 2**1001 - 1)
+
+
+def test_draws_that_decide_the_count_give_a_range(tmp_path, capsys):
+    scene = tmp_path / "s.plsys"
+    scene.write_text(
+        "Selection A { C A; if (n > 0) A -> 3: box + [ --n ] A | 1: box; else A -> ; }\n"
+        "Calculation C { n = 2; }\nobject { A }\n"
+    )
+    forecast = facts(capsys, "check", str(scene))["files"][0]["forecast"]
+    assert forecast["primitives"] is None
+    assert forecast["primitives_range"] == {"low": 1, "expected": 1.75, "high": 2}
+
+
+def test_check_tells_errors_with_places(tmp_path, capsys):
+    scene = tmp_path / "s.plsys"
+    scene.write_text("object { Tre }\nSelection Tree { Tree -> box; }\n")
+    assert main(["check", str(scene), "--json"]) == 2
+    entry = json.loads(capsys.readouterr().out)["files"][0]
+    error = next(d for d in entry["diagnostics"] if d["severity"] == "error")
+    assert (error["line"], error["column"], error["end_line"], error["end_column"]) == (1, 10, 1, 13)
+    assert error["code"] == "unknown-name" and "Tree" in error["hint"] and entry["forecast"] is None
+
+
+def test_both_disassemblers_print_the_same(tmp_path, capsys):
+    data = tmp_path / "t.plsb"
+    assert main(["compile", TREE, "-o", str(data)]) == 0
+    capsys.readouterr()
+    assert main(["disassemble", str(data)]) == 0
+    text = capsys.readouterr().out
+    from plsys.runtime import disassemble
+
+    assert disassemble(data.read_bytes()) == text
+    assert "symbol" in text and "Tree" in text
+
+
+@pytest.mark.parametrize("command", ["render", "check", "compile", "export", "compare", "graph", "disassemble"])
+def test_every_command_explains_itself(command, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([command, "--help"])
+    assert stop.value.code == 0
+    shown = capsys.readouterr().out
+    assert "--json" in shown and len(shown.splitlines()) > 8
+
+
+def test_a_closed_pipe_is_no_error():
+    code = "from plsys.compiler.cli import main; import sys; sys.exit(main(['disassemble', 'scenes/tower.plsys']))"
+    shell = f'"{sys.executable}" -c "{code}" | head -1'
+    done = subprocess.run(["bash", "-o", "pipefail", "-c", shell], capture_output=True, text=True)
+    assert "Traceback" not in done.stderr and done.stdout.startswith("bytecode")
+
+
+def test_the_same_seed_gives_the_same_bits_again(tmp_path):
+    paths = [tmp_path / f"{i}.exr" for i in range(2)]
+    for path, threads in zip(paths, "12"):
+        assert main(["render", "scenes/bush.plsys", "-o", str(path), "--threads", threads, *SMALL]) == 0
+    np.testing.assert_array_equal(pixels(paths[0]), pixels(paths[1]))
+
+
+def test_a_scene_can_be_used_from_python():
+    from plsys.compiler import compile
+
+    with Scene(compile(TREE, parameters={"order": 3})) as scene:
+        hits = scene.intersect(np.array([[0.0, -14, 1], [0, -14, 1]]), np.array([[0.0, 1, 0], [0, 0, 1]]))
+        assert hits.t[0] == pytest.approx(14 - 0.15) and np.isinf(hits.t[1])
+        assert np.isnan(hits.bound[0]) and hits.primitive[1] == -1
+        assert scene.occluded(np.array([[0.0, -14, 1]]), np.array([[0.0, 1, 0]]), np.array([13.0])).tolist() == [False]
