@@ -10,14 +10,14 @@ Pointers to arrays are passed as addresses (``pointer``); whoever calls keeps th
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, c_bool, c_char, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint64, c_void_p
+from ctypes import POINTER, c_bool, c_char, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64, c_void_p
 from functools import cache
 from pathlib import Path
 
 from .errors import KINDS, PlsysRuntimeError, RuntimeArgumentError
 
 LIBRARY = Path(__file__).with_name("libplsys.so")
-ACCELERATORS = ("auto", "none", "boxes", "bvh")
+ACCELERATORS = ("auto", "none", "boxes", "bvh", "grid")
 ANTIALIAS = ("off", "grid", "adaptive")
 
 
@@ -38,7 +38,13 @@ class PlError(ctypes.Structure):
 class PlOptions(ctypes.Structure):
     """pl_options."""
 
-    _fields_ = [("accelerator", c_int), ("threads", c_int), ("memory", c_size_t), ("povray_epsilon", c_bool)]
+    _fields_ = [
+        ("accelerator", c_int),
+        ("threads", c_int),
+        ("memory", c_size_t),
+        ("povray_epsilon", c_bool),
+        ("grid", c_uint32 * 3),
+    ]
 
 
 class PlHits(ctypes.Structure):
@@ -110,7 +116,7 @@ _FUNCTIONS = {
     "pl_scene_statistics": (None, [c_void_p, POINTER(PlStatistics)]),
     "pl_symbol_name": (c_char_p, [c_void_p, c_int32]),
     "pl_rule_place": (c_char_p, [c_void_p, c_int32]),
-    "pl_scene_texture": (POINTER(c_double), [c_void_p, c_int32, POINTER(ctypes.c_uint32)]),
+    "pl_scene_texture": (POINTER(c_double), [c_void_p, c_int32, POINTER(c_uint32)]),
     "pl_unfold_begin": (c_void_p, [c_void_p, _ERROR]),
     "pl_unfold_next": (c_int64, [c_void_p, c_size_t, *[c_void_p] * 6, _ERROR]),
     "pl_unfold_end": (None, [c_void_p]),

@@ -11,10 +11,12 @@
 #include "table.h"
 
 static const pl_accel *const accelerators[] = {
-    [PL_AUTO] = &pl_accel_bvh, [PL_NONE] = &pl_accel_none, [PL_BOXES] = &pl_accel_boxes, [PL_BVH] = &pl_accel_bvh};
-static const int accelerator_ids[] = {[PL_AUTO] = PL_BVH, [PL_NONE] = PL_NONE, [PL_BOXES] = PL_BOXES, [PL_BVH] = PL_BVH};
+    [PL_AUTO] = &pl_accel_bvh, [PL_NONE] = &pl_accel_none, [PL_BOXES] = &pl_accel_boxes,
+    [PL_BVH] = &pl_accel_bvh, [PL_GRID] = &pl_accel_grid};
+static const int accelerator_ids[] = {
+    [PL_AUTO] = PL_BVH, [PL_NONE] = PL_NONE, [PL_BOXES] = PL_BOXES, [PL_BVH] = PL_BVH, [PL_GRID] = PL_GRID};
 
-enum { MOST_THREADS = 1024 };
+enum { MOST_THREADS = 1024, MOST_VOXELS = 1 << 26 };
 
 double pl_seconds(void)
 {
@@ -65,14 +67,26 @@ static bool is_opaque(const pl_program *program)
 
 /* --- creation --- */
 
+static bool check_grid(const uint32_t grid[3], pl_error *error)
+{
+    uint64_t voxels = 1;
+    for (int axis = 0; axis < 3; axis++) {
+        if (!grid[axis] != !grid[0])
+            return pl_fail(error, PL_ERROR_ARGUMENT, "grid", "%ux%ux%u; every side needs a voxel", grid[0], grid[1], grid[2]);
+        voxels = voxels > MOST_VOXELS ? voxels : voxels * grid[axis];
+    }
+    return voxels <= MOST_VOXELS || pl_fail(error, PL_ERROR_ARGUMENT, "grid", "%ux%ux%u are more than %d voxels", grid[0],
+                                            grid[1], grid[2], MOST_VOXELS);
+}
+
 static bool check_options(const pl_options *options, pl_error *error)
 {
-    if (options->accelerator < PL_AUTO || options->accelerator > PL_BVH)
+    if (options->accelerator < PL_AUTO || options->accelerator > PL_GRID)
         return pl_fail(error, PL_ERROR_ARGUMENT, "accelerator", "there is no accelerator number %d", options->accelerator);
     if (options->threads < 0 || options->threads > MOST_THREADS)
         return pl_fail(error, PL_ERROR_ARGUMENT, "threads", "%d threads; 1 to %d, or 0 for one a core", options->threads,
                        MOST_THREADS);
-    return true;
+    return check_grid(options->grid, error);
 }
 
 /* Half of the machine's memory, at most PL_STATES_DEFAULT_BYTES. */

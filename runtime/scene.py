@@ -64,7 +64,8 @@ class Batch(NamedTuple):
 class Scene:
     """Bytecode, ready to be traced.
 
-    accelerator: "auto" (bvh), "none" (the paper's chapter 2), "boxes" (chapter 3) or "bvh"; all give the same hits.
+    accelerator: "auto" (bvh), "none" (the paper's chapter 2), "boxes" (chapter 3), "grid" (chapter 4) or
+    "bvh"; all give the same hits. grid: voxels of "grid" along x, y and z (None: 16, 16, 8).
     memory: bytes that states and structures may take (None: chosen by the machine). threads: None for one a core.
     povray_epsilon: POV-Ray's hit and shadow tolerances when rendering. PlsysRuntimeError for bytes that aren't valid
     bytecode, scenes that can't be derived, and limits.
@@ -77,6 +78,7 @@ class Scene:
         memory: int | None = None,
         threads: int | None = None,
         povray_epsilon: bool = False,
+        grid: tuple[int, int, int] | None = None,
     ) -> None:
         self._handle: int | None = None
         self._users = 0
@@ -88,6 +90,7 @@ class Scene:
             threads=_count("threads", threads, 0, 1024),
             memory=_count("memory", memory, 0, 2**63 - 1),
             povray_epsilon=bool(povray_epsilon),
+            grid=_voxels(grid),
         )
         error = PlError()
         self._handle = library().pl_scene_create(data, len(data), ctypes.byref(options), ctypes.byref(error))
@@ -340,6 +343,16 @@ def _count(what: str, value: object, low: int, high: int) -> int:
     if not low <= number <= high:
         raise RuntimeArgumentError(what, f"{number} is not between {low} and {high}")
     return number
+
+
+def _voxels(grid: object) -> tuple[int, int, int]:
+    try:
+        sides = (0, 0, 0) if grid is None else tuple(grid)
+    except TypeError:
+        sides = ()
+    if len(sides) != 3:
+        raise RuntimeArgumentError("grid", f"expected three numbers of voxels, not {grid!r}")
+    return tuple(_count("grid", side, 0 if grid is None else 1, 2**26) for side in sides)
 
 
 def _rays(origins, directions) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ from plsys.compiler.reading.source import Source
 from plsys.runtime import Scene
 from random_scenes import scenes
 
-ACCELERATORS = ("none", "boxes", "bvh")
+ACCELERATORS = ("none", "boxes", "grid", "bvh")
 TREE = "scenes/tree.plsys"
 RANDOM = settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
 

@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--tolerance", type=float, metavar="UNITS", help="of the mesh, in scene units")
     parser.add_argument(
-        "--accel", choices=("auto", "none", "boxes", "bvh"), default="auto", help="accelerator"
+        "--accel", choices=("auto", "none", "boxes", "grid", "bvh"), default="auto", help="accelerator"
     )
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="default: one a core")
 

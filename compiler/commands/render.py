@@ -15,6 +15,7 @@ from pathlib import Path
 from ..reading.diagnostics import PlsysError
 from .common import add_scene_arguments, build_scene, json_integer, print_json, size
 
+ACCELERATORS = ("auto", "none", "boxes", "grid", "bvh")
 ANTIALIAS = "off, grid=N (centre and N×N sub-cells), or adaptive[=DEPTH[,THRESHOLD]]"
 
 # Channel name → the names of its components in a file; `picture1` is made from two of the runtime's channels.
@@ -36,7 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", dest="output", metavar="OUT", required=True, help="the picture: .png, .exr, .tif, …")
     parser.add_argument("--size", type=size, default=(640, 480), metavar="WxH", help="in pixels (default 640x480)")
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="default: one a core")
-    parser.add_argument("--accel", choices=("auto", "none", "boxes", "bvh"), default="auto", help="accelerator")
+    parser.add_argument("--accel", choices=ACCELERATORS, default="auto", help="accelerator")
+    parser.add_argument("--grid", type=voxels, metavar="NxMxK", help="voxels of --accel grid (default 16x16x8)")
     parser.add_argument("--antialias", type=antialias, default=("off", 0, 0.0), metavar="A", help=ANTIALIAS)
     parser.add_argument("--aov", type=aov_names, default=(), metavar="A,B", help=f"extra channels: {', '.join(AOVS)}")
     parser.add_argument("--linear16", action="store_true", help="16-bit linear values instead of 8-bit sRGB")
@@ -63,6 +65,14 @@ def antialias(text: str) -> tuple[str, int, float]:
     except ValueError:
         pass
     raise argparse.ArgumentTypeError(f"'{text}' isn't {ANTIALIAS}")
+
+
+def voxels(text: str) -> tuple[int, int, int]:
+    """``16x16x8`` → ``(16, 16, 8)``"""
+    sides = text.split("x")
+    if len(sides) != 3 or not all(side.isdecimal() and 1 <= int(side) <= 4096 for side in sides):
+        raise argparse.ArgumentTypeError(f"'{text}' isn't NxMxK, such as 16x16x8")
+    return tuple(int(side) for side in sides)
 
 
 def aov_names(text: str) -> tuple[str, ...]:
@@ -94,6 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
         accelerator=arguments.accel,
         threads=arguments.threads or None,
         povray_epsilon=arguments.povray_epsilon,
+        grid=arguments.grid,
     ) as scene:
         image = _render(scene, arguments)
         statistics = scene.statistics

@@ -1,11 +1,13 @@
 /* boxes.c - the paper's chapter 3: one box a graph node, made conservative.
  *
  * The paper takes the box of a node's root-level instance, which cuts off deeper instances that outgrow it. Here a node's
- * box is the union over all its instances, each in the node's own frame, found through the shared states. A hit's primitive index
- * follows from its path afterwards (trace.c), since subtrees that were skipped aren't counted. */
+ * box is the union over all its instances, each in the node's own frame, found through the shared states. Like the
+ * paper's it is computed from the primitives through the whole chain of transformations, not from other boxes
+ * (extent.c). A hit's primitive index follows from its path afterwards (trace.c), since subtrees that were skipped
+ * aren't counted. */
 #include "walk.h"
 
-static bool missed(const pl_walk *walk, const pl_scene *scene, pl_counters *counters, const pl_query *query)
+bool pl_walk_misses_box(const pl_walk *walk, const pl_scene *scene, pl_counters *counters, const pl_query *query)
 {
     const pl_node_box *node = &scene->states.node_boxes[walk->node];
     double t_entry;
@@ -19,7 +21,7 @@ static bool missed(const pl_walk *walk, const pl_scene *scene, pl_counters *coun
     return true;
 }
 
-static void *work_create(const pl_scene *scene, pl_error *error)
+void *pl_walk_announcing_create(const pl_scene *scene, pl_error *error)
 {
     pl_walk *walk = pl_walk_work_create(scene, error);
     if (walk) walk->announce = true;
@@ -28,12 +30,12 @@ static void *work_create(const pl_scene *scene, pl_error *error)
 
 static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
 {
-    return pl_walk_trace(tracer->work, tracer->scene, &tracer->counters, ray, query, missed);
+    return pl_walk_trace(tracer->work, tracer->scene, &tracer->counters, ray, query, pl_walk_misses_box);
 }
 
 const pl_accel pl_accel_boxes = {.name = "boxes",
                                  .states = true,
                                  .node_boxes = true,
-                                 .work_create = work_create,
+                                 .work_create = pl_walk_announcing_create,
                                  .work_destroy = pl_walk_work_destroy,
                                  .trace = trace};

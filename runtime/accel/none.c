@@ -12,16 +12,10 @@ static bool walk_path(const void *source, pl_path *path)
     return pl_path_copy(path, &walk->path, walk->at.terms);
 }
 
-bool pl_walk_trace(pl_walk *walk, const pl_scene *scene, pl_counters *counters, const pl_ray *ray, pl_query *query,
-                   pl_node_test missed)
+bool pl_walk_offer(pl_walk *walk, const pl_scene *scene, pl_counters *counters, pl_query *query, pl_node_test missed)
 {
     uint64_t primitive = 0, steps = 0;
-    double *o, *d;
-    pl_walk_restart(walk, 0, NULL);
-    o = walk->at.payload;
-    d = o + 3;
-    memcpy(o, ray->origin, 3 * sizeof *o);
-    memcpy(d, ray->direction, 3 * sizeof *d);
+    double *o = walk->at.payload, *d = o + 3;
     while (!query->done) {
         pl_leaf leaf = {.path = walk_path, .source = walk};
         if (++steps > PL_LIMIT_WALK_STEPS) return pl_query_fail_steps(query, PL_LIMIT_WALK_STEPS);
@@ -46,6 +40,15 @@ bool pl_walk_trace(pl_walk *walk, const pl_scene *scene, pl_counters *counters, 
         if (!pl_query_leaf(query, &leaf, o, d)) return false;
     }
     return true;
+}
+
+bool pl_walk_trace(pl_walk *walk, const pl_scene *scene, pl_counters *counters, const pl_ray *ray, pl_query *query,
+                   pl_node_test missed)
+{
+    pl_walk_restart(walk, 0, NULL);
+    memcpy(walk->at.payload, ray->origin, 3 * sizeof(double));
+    memcpy(walk->at.payload + 3, ray->direction, 3 * sizeof(double));
+    return pl_walk_offer(walk, scene, counters, query, missed);
 }
 
 void *pl_walk_work_create(const pl_scene *scene, pl_error *error)

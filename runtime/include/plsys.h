@@ -42,13 +42,14 @@ enum pl_error_code {
     PL_ERROR_OUTPUT     /* a file can't be written */
 };
 
-enum pl_accelerator { PL_AUTO = 0, PL_NONE, PL_BOXES, PL_BVH };
+enum pl_accelerator { PL_AUTO = 0, PL_NONE, PL_BOXES, PL_BVH, PL_GRID };
 
 typedef struct pl_options {
     int accelerator;     /* pl_accelerator */
     int threads;         /* 0: one a core */
     size_t memory;       /* bytes for states and structures; 0: chosen automatically */
     bool povray_epsilon; /* POV-Ray's hit and shadow tolerances instead of ours */
+    uint32_t grid[3];    /* of PL_GRID: voxels along x, y and z; all 0: 16, 16 and 8 */
 } pl_options;
 
 typedef struct pl_scene pl_scene;

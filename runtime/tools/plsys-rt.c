@@ -28,7 +28,8 @@ static const char usage[] =
     "  -o OUT.pfm          the picture\n"
     "  --size WxH          in pixels (640x480)\n"
     "  --threads N         1 to 1024 (one a core)\n"
-    "  --accel A           auto, none, boxes or bvh: same picture, different speed (auto)\n"
+    "  --accel A           auto, none, boxes, grid or bvh: same picture, different speed (auto)\n"
+    "  --grid NxMxK        voxels of --accel grid (16x16x8)\n"
     "  --antialias A       off, grid=N (centre and NxN sub-cells) or adaptive=DEPTH (off)\n"
     "  --povray-epsilon    POV-Ray's hit and shadow tolerances\n"
     "  --dump              print the bytecode as text instead\n"
@@ -79,13 +80,23 @@ static bool parse_antialias(const char *text, pl_render_options *render)
 
 static bool parse_accelerator(const char *text, int *accelerator)
 {
-    static const char *const names[] = {"auto", "none", "boxes", "bvh"};
-    for (int i = 0; i < 4; i++)
+    static const char *const names[] = {"auto", "none", "boxes", "bvh", "grid"};
+    for (int i = 0; i < 5; i++)
         if (strcmp(text, names[i]) == 0) {
             *accelerator = i;
             return true;
         }
     return false;
+}
+
+static bool parse_grid(const char *text, uint32_t grid[3])
+{
+    int sides[3];
+    if (!parse_number(text, 'x', 1, 4096, &sides[0], &text) || !parse_number(text, 'x', 1, 4096, &sides[1], &text) ||
+        !parse_number(text, '\0', 1, 4096, &sides[2], NULL))
+        return false;
+    for (int axis = 0; axis < 3; axis++) grid[axis] = (uint32_t)sides[axis];
+    return true;
 }
 
 /* An option with a value. */
@@ -105,7 +116,9 @@ static bool parse_value(arguments *a, const char *option, const char *value)
                complain("--threads %s: expected a number from 1 to 1024", value);
     if (strcmp(option, "--accel") == 0)
         return parse_accelerator(value, &a->options.accelerator) ||
-               complain("--accel %s: expected auto, none, boxes or bvh", value);
+               complain("--accel %s: expected auto, none, boxes, grid or bvh", value);
+    if (strcmp(option, "--grid") == 0)
+        return parse_grid(value, a->options.grid) || complain("--grid %s: expected NxMxK, such as 16x16x8", value);
     if (strcmp(option, "--antialias") == 0)
         return parse_antialias(value, &a->render) ||
                complain("--antialias %s: expected off, grid=N or adaptive=DEPTH", value);

@@ -36,7 +36,7 @@ def read_pfm(path: Path) -> np.ndarray:
     return np.frombuffer(pixels, np.float32).reshape(height, width, 3)[::-1]
 
 
-@pytest.mark.parametrize("accelerator", ["auto", "none", "boxes", "bvh"])
+@pytest.mark.parametrize("accelerator", ["auto", "none", "boxes", "bvh", "grid"])
 def test_the_picture_is_the_binding_s(plsys_rt, tree, tmp_path, accelerator):
     output = tmp_path / "tree.pfm"
     done = whole.run(plsys_rt, tree, "-o", output, "--size", "40x30", "--threads", 2, "--accel", accelerator)
@@ -69,8 +69,9 @@ def test_dump_prints_the_disassembly(plsys_rt, tmp_path):
         (["tree.plsb", "-o", "x.pfm", "--size", "640"], "--size 640: expected WxH, such as 640x480"),
         (["tree.plsb", "-o", "x.pfm", "--size", "0x5"], "--size 0x5: expected WxH"),
         (["tree.plsb", "-o", "x.pfm", "--threads", "many"], "--threads many: expected a number from 1 to 1024"),
-        (["tree.plsb", "-o", "x.pfm", "--accel", "kd"], "--accel kd: expected auto, none, boxes or bvh"),
-        (["tree.plsb", "-o", "x.pfm", "--colour", "red"], "no option '--colour'"),
+        (["tree.plsb", "-o", "x.pfm", "--accel", "kd"], "--accel kd: expected auto, none, boxes, grid or bvh"),
+        (["tree.plsb", "-o", "x.pfm", "--grid", "16x16"], "--grid 16x16: expected NxMxK"),
+            (["tree.plsb", "-o", "x.pfm", "--colour", "red"], "no option '--colour'"),
         (["tree.plsb", "other.plsb", "-o", "x.pfm"], "one scene at a time"),
         (["missing.plsb", "-o", "x.pfm"], "missing.plsb can't be read: No such file or directory"),
         (["tree.plsb", "-o", "no/where/x.pfm"], "no/where/x.pfm can't be written: No such file or directory"),
