@@ -42,7 +42,8 @@ class _Nothing(list):
 
 
 class _Router(Diagnostics):
-    """Puts each message to the block that it is about."""
+    """Puts each message to the block that it is about; of blocks with syntax errors, whose meaning can only be guessed
+    at, it keeps none."""
 
     def __init__(self, messages: dict[Block, list[Diagnostic]]) -> None:
         super().__init__()
@@ -51,6 +52,8 @@ class _Router(Diagnostics):
     def add(self, code: str, span: Span, message: str, hint: str = "", notes: Iterable[Note] = ()) -> None:
         super().add(code, span, message, hint, notes)
         found = self.items.pop()
+        if facts_of(span.source).is_broken:  # type: ignore[arg-type]
+            return
         known = self.messages.setdefault(span.source, [])  # type: ignore[arg-type]
         if not any((k.code, k.span.start, k.message) == (code, span.start, message) for k in known):
             known.append(found)
@@ -65,6 +68,16 @@ class _BlockResolver(_Resolver):
         self.names.entries = entries
         # Which entry actions run where decides no message, and the closure of all references costs too much per key.
         self.terms.reached = lambda name: frozenset()  # type: ignore[method-assign]
+        self._suggestions: dict[tuple, str] = {}
+        self._suggest_anew = self.names._suggest
+        self.names._suggest = self._suggest  # type: ignore[method-assign]
+
+    def _suggest(self, name: syntax.Name, kinds: tuple[str, ...]) -> str:
+        """A wrong name that stands in several places of a block is compared with all others once."""
+        key = (name.name, kinds)
+        if key not in self._suggestions:
+            self._suggestions[key] = self._suggest_anew(name, kinds)
+        return self._suggestions[key]
 
     def load_mesh(self, call: syntax.Call) -> int:
         """Meshes are loaded by the whole-file checks; here it is enough that the file is there."""
@@ -226,19 +239,27 @@ class Scene:
             for block in self.users.get(queue.pop(), ()):
                 self._dirty[block] = None
                 for definition in facts_of(block).definitions:
-                    entry = self.entries.get(definition.name)
-                    if entry is None or entry.node is not definition.node:
-                        continue
-                    entry.value, entry.failed = None, False
-                    if entry.kind in _VALUES and definition.name not in seen:
+                    entry = self._renew(definition)
+                    if entry is not None and entry.kind in _VALUES and definition.name not in seen:
                         seen.add(definition.name)
                         queue.append(definition.name)
+
+    def _renew(self, definition: Definition) -> Entry | None:
+        """Forget the value of the entry that ``definition`` makes; the entry, if it makes one."""
+        entry = self.entries.get(definition.name)
+        if entry is None or entry.node is not definition.node:
+            return None
+        entry.value, entry.failed = None, False
+        return entry
 
     def _resolve(self, block: Block) -> None:
         self._messages.pop(block, None)
         facts = facts_of(block)
         if facts.is_broken:
             return  # what it means can only be guessed at
+        for definition in facts.definitions:
+            # Another block that uses it may have been first, and its messages went with the old ones.
+            self._renew(definition)
         try:
             _BlockResolver(block, self._router, self.entries).run_on(facts)
         except RecursionError:

@@ -17,7 +17,8 @@ Example::
 from __future__ import annotations
 
 import difflib
-import os
+import heapq
+import operator
 import re
 from dataclasses import dataclass, field
 from typing import Iterable
@@ -103,12 +104,11 @@ def nearest(name: str, candidates: Iterable[str]) -> str:
     """A hint that names the closest candidate, or ''."""
     names = list(candidates)
     if len(names) > MANY_NAMES:
-        # Comparing takes some 20 µs a name: of many, look only at those of like length that begin or end alike.
-        head, tail, length = name[:2].lower(), name[-2:].lower(), len(name)
-        alike = [other for other in names if abs(len(other) - length) <= 2]
-        alike = [other for other in alike if other[:2].lower() == head or other[-2:].lower() == tail]
-        alike.sort(key=lambda other: -len(os.path.commonprefix((name, other))))
-        names = alike[: MANY_NAMES // 4]
+        # A full comparison takes some 100 µs. Of many names, only those of like length that begin or end alike are
+        # worth it, and of these the ones that have most letters in the same places.
+        head, tail, least, most = name[:2], name[-2:], len(name) - 2, len(name) + 2
+        names = [other for other in names if least <= len(other) <= most and (other[:2] == head or other[-2:] == tail)]
+        names = heapq.nlargest(20, names, key=lambda other: sum(map(operator.eq, name, other)))
     matches = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return f"did you mean '{matches[0]}'?" if matches else ""
 

@@ -56,6 +56,19 @@ def test_scenes_get_the_compilers_messages(path):
     assert told(project, document) == compiled(Source.read(path))
 
 
+def test_a_mistake_in_what_an_earlier_block_uses():
+    """The object is resolved first, and the texture with it; the message stays the texture's."""
+    project = Project()
+    document = project.open(None, SMALL.replace(b"Bark {", b"Bark { glossy", 1), name="x")
+    assert [code for _, _, code, _ in told(project, document)] == ["unknown-name"]
+
+
+def test_what_a_broken_block_means_is_not_judged_by_its_users():
+    project = Project()
+    document = project.open(None, SMALL.replace(b"Bark { pigment", b"Bark { p{igment", 1), name="x")
+    assert {code for _, _, code, _ in told(project, document)} == {"unclosed"}
+
+
 MISTAKES = [
     (b"Tree(order)", b"Tree"), (b"Tree(order)", b"Tre(order)"), (b"{ Bark }", b"{ Height }"), (b"Height = 2", b"Height = 0"),
     (b"Height * 2", b"1 / (Height - 2)"), (b"[0 to 9]", b"[5 to 9]"), (b"angle = 60", b"Height = 60"), (b"C_less {", b"C_init {"),
