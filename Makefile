@@ -12,7 +12,7 @@ SOURCES := pyproject.toml CMakeLists.txt README.md LICENSE grammar/src/parser.c 
 RUNTIME_C := $(wildcard runtime/*.c runtime/shapes/*.c runtime/accel/*.c)
 CFLAGS_DEV := -std=gnu11 -O2 -g -Wall -Wextra -Werror -ffp-contract=off -fno-math-errno -fPIC -fvisibility=hidden -Iruntime -Iruntime/include
 
-.PHONY: render test help dev generate check-generated bless sanitize wheel clean
+.PHONY: render test help dev generate bench-lsp check-generated bless sanitize wheel clean
 
 render: .venv/.installed ## draw SCENE to OUT
 	$(BIN)/plsys render $(SCENE) -o $(OUT)
@@ -51,6 +51,9 @@ compiler/libgrammar.so: grammar/src/parser.c
 generate: ## write all generated files again
 	$(PYTHON) runtime/generate.py
 	$(PYTHON) grammar/generate.py
+
+bench-lsp: .venv/.tests ## measure the language server against its budgets
+	$(BIN)/python tests/bench/lsp.py
 
 check-generated: ## fail if a generated file isn't what its table gives
 	$(PYTHON) runtime/generate.py --check

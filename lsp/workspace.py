@@ -13,14 +13,17 @@ Example::
 
 from __future__ import annotations
 
+import logging
 import os
 from pathlib import Path
-from typing import Iterable
+from typing import Iterable, Iterator
 from urllib.parse import quote, unquote, urlsplit
 
 from plsys.compiler.analysis import Document, Message, Place, Project, Scene
 
-from .text import Positions, encode
+from .text import Edit, Positions, encode
+
+logger = logging.getLogger(__name__)
 
 # A list of more messages than this helps nobody, and slows down the editor.
 MAX_DIAGNOSTICS = 500
@@ -56,10 +59,18 @@ class Workspace:
         document = self.open.get(uri)
         if document is None:
             return None
-        positions = self.positions(document)
-        self.project.edits(document, (positions.edit(change) for change in changes))
+        self.project.edits(document, self._edits(document, changes))
         document.version = version
         return document
+
+    def _edits(self, document: Document, changes: Iterable[dict]) -> Iterator[Edit]:
+        """The changes as edits, up to the first that makes no sense: what was applied by then has to be analysed."""
+        positions = self.positions(document)
+        try:
+            for change in changes:
+                yield positions.edit(change)
+        except (KeyError, TypeError, AttributeError) as error:
+            logger.warning("a change that makes no sense: %r", error)
 
     def did_close(self, uri: str) -> Document | None:
         document = self.open.pop(uri, None)

@@ -20,6 +20,7 @@ from ..reading import syntax, vocabulary
 from ..reading.codes import CODES
 from ..reading.diagnostics import Diagnostic, PlsysError, nearest
 from ..reading.source import Span
+from .context import Context, context_at
 from .document import Document, Meaning, Message, Outline, Place
 from .facts import Definition, Facts, Name, facts_of
 from .project import Project
@@ -29,6 +30,6 @@ from .whole import Checker, Result
 from .whole import run as check_whole
 
 __all__ = [
-    "CODES", "Block", "Change", "Checker", "Definition", "Diagnostic", "Document", "Facts", "Meaning", "Message", "Name", "Outline",
-    "Place", "PlsysError", "Project", "Result", "Scene", "Span", "Text", "check_whole", "facts_of", "nearest", "syntax", "vocabulary",
+    "CODES", "Block", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Meaning", "Message", "Name", "Outline",
+    "Place", "PlsysError", "Project", "Result", "Scene", "Span", "Text", "check_whole", "context_at", "facts_of", "nearest", "syntax", "vocabulary",
 ]  # fmt: skip

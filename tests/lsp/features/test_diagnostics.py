@@ -108,3 +108,12 @@ def test_whole_file_checks_of_included_files(tmp_path):
     editor.checked("main.plsys")
     (message,) = [each for each in editor.checked("lib.plsys") if each["code"] == "endless"]
     assert message["range"]["start"] == {"line": 1, "character": 10}
+
+
+def test_a_change_that_makes_no_sense_loses_none_before_it():
+    editor = Editor("object { A }\nSelection A { A -> box; }\n")
+    place = {"line": 0, "character": 10}
+    good = {"range": {"start": place, "end": place}, "text": "B"}
+    document = {"uri": editor.uri("scene.plsys"), "version": 2}
+    editor.notify("textDocument/didChange", {"textDocument": document, "contentChanges": [good, {"range": 3}]})
+    assert editor.codes() == ["unknown-name"]
