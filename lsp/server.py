@@ -26,6 +26,9 @@ logger = logging.getLogger(__name__)
 _LENGTH = re.compile(rb"content-length:\s*(\d+)\s*$", re.IGNORECASE)
 MAX_MESSAGE_BYTES = 1 << 30
 
+# Whole-file checks begin when nothing was typed for so long: their snapshot costs some milliseconds.
+PAUSE_S = 0.1
+
 
 class Dispatcher:
     """The messages of one client that wait, and the session that takes them, one a turn of the event loop. ``write``
@@ -39,6 +42,7 @@ class Dispatcher:
         self.inbox: deque[Any] = deque()
         self.cancelled: set[Any] = set()
         self._scheduled = False
+        self._pause: asyncio.TimerHandle | None = None
 
     def deliver(self, body: bytes) -> None:
         """Take the bytes of a message. On the event loop's thread."""
@@ -81,6 +85,9 @@ class Dispatcher:
             self._handle(self.inbox.popleft())
         elif self.session.has_work:
             self.session.work()
+            if self._pause is not None:
+                self._pause.cancel()
+            self._pause = asyncio.get_running_loop().call_later(PAUSE_S, self.session.start_checks)
         if self.session.exit_code is not None:
             self.leave()
         elif self.is_busy:

@@ -274,7 +274,10 @@ class Session:
         if not pulls:
             for document in documents:
                 self._publish(document)
-        if finished and self._checker is not None:
+
+    def start_checks(self) -> None:
+        """Have what changed checked as a whole. To be called when the client has paused."""
+        if self._checker is not None and not self._changed:
             self._checker.go()
 
     def _on_result(self, result: Result) -> None:
@@ -290,6 +293,9 @@ class Session:
         refresh = ((self.client.get("workspace") or {}).get("diagnostics") or {}).get("refreshSupport")
         if refresh and (self.client.get("textDocument") or {}).get("diagnostic") is not None:
             self.ask("workspace/diagnostic/refresh")
+        refresh = ((self.client.get("workspace") or {}).get("inlayHint") or {}).get("refreshSupport")
+        if refresh and result.answer.insights is not None:
+            self.ask("workspace/inlayHint/refresh")
 
     def _publish(self, document: Document) -> None:
         uri = self.workspace.uris.get(document)
