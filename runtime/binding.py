@@ -18,6 +18,7 @@ from .errors import KINDS, PlsysRuntimeError, RuntimeArgumentError
 
 LIBRARY = Path(__file__).with_name("libplsys.so")
 ACCELERATORS = ("auto", "none", "boxes", "bvh", "grid")
+INSTRUCTION_SETS = ("auto", "scalar", "avx2", "avx512")
 ANTIALIAS = ("off", "grid", "adaptive")
 
 
@@ -44,6 +45,7 @@ class PlOptions(ctypes.Structure):
         ("memory", c_size_t),
         ("povray_epsilon", c_bool),
         ("grid", c_uint32 * 3),
+        *(("isa", c_int), ("front_items", c_uint64)),
     ]
 
 

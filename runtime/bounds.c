@@ -48,7 +48,7 @@ static pl_affine compose(const pl_affine *outer, const pl_item *item)
 
 /* The box of an item's bounded primitives under `map`. The box of a box is loose where frames are turned against each
  * other, so states are opened breadth first until OPENED_ITEMS stand in the queue. */
-static pl_box mapped_item_box(const pl_states *states, const pl_item *item, const pl_affine *map)
+pl_box pl_box_under(const pl_states *states, const pl_item *item, const pl_affine *map)
 {
     struct {
         const pl_item *item;
@@ -98,7 +98,7 @@ pl_box pl_item_box(const pl_states *states, const pl_item *item, pl_reach *reach
     pl_affine identity = pl_affine_identity(), map = compose(&identity, item);
     *reach = pl_item_reach(states, item);
     for (uint32_t i = item->transform_count; i-- > 0;) *reach = pl_reach_through(item->transforms[i], reach);
-    return mapped_item_box(states, item, &map);
+    return pl_box_under(states, item, &map);
 }
 
 /* The item of a state whose terms stand at path[at …]; items are in path order. */

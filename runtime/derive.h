@@ -45,7 +45,7 @@ typedef struct pl_spot {
     uint32_t depth;       /* symbols entered */
     uint32_t symbol;      /* node of the innermost symbol, UINT32_MAX: none */
     int32_t rule;         /* index of the innermost rule, -1: none */
-    uint32_t marks[2];    /* the user's */
+    uint32_t marks[5];    /* the user's */
     bool no_shadow;
     double payload[PL_PAYLOAD];
 } pl_spot;

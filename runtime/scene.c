@@ -67,6 +67,20 @@ static bool is_opaque(const pl_program *program)
 
 /* --- creation --- */
 
+/* The best instruction set that this machine has. */
+static int best_isa(void)
+{
+#ifdef __x86_64__
+    __builtin_cpu_init();
+    bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
+    if (avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+        __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw"))
+        return PL_ISA_AVX512;
+    if (avx2) return PL_ISA_AVX2;
+#endif
+    return PL_ISA_SCALAR;
+}
+
 static bool check_grid(const uint32_t grid[3], pl_error *error)
 {
     uint64_t voxels = 1;
@@ -86,6 +100,8 @@ static bool check_options(const pl_options *options, pl_error *error)
     if (options->threads < 0 || options->threads > MOST_THREADS)
         return pl_fail(error, PL_ERROR_ARGUMENT, "threads", "%d threads; 1 to %d, or 0 for one a core", options->threads,
                        MOST_THREADS);
+    if (options->isa < PL_ISA_AUTO || options->isa > best_isa())
+        return pl_fail(error, PL_ERROR_ARGUMENT, "isa", "this machine doesn't have instruction set number %d", options->isa);
     return check_grid(options->grid, error);
 }
 
@@ -178,6 +194,7 @@ pl_scene *pl_scene_create(const void *bytecode, size_t length, const pl_options 
     pthread_mutex_init(&scene->lock, NULL);
     scene->options = *options;
     scene->accel = accelerators[options->accelerator];
+    scene->isa = options->isa ? options->isa : best_isa();
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
     scene->threads = options->threads ? options->threads : cores > 0 ? (int)cores : 1;
     double start = pl_seconds();

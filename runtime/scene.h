@@ -20,14 +20,15 @@ struct pl_scene {
     pl_options options;
     int threads;
     bool all_opaque;
+    int isa; /* of the accelerator's kernel: pl_isa */
     char **rule_places; /* of program->rules */
     pthread_mutex_t lock; /* of statistics */
     pl_statistics statistics;
 };
 
-/* Growing array of transformations, from the root to a leaf. */
+/* Growing array of inverse transformations, from the root to a leaf. */
 typedef struct pl_chain {
-    pl_transform *list;
+    pl_affine *list;
     size_t count, capacity;
 } pl_chain;
 
@@ -38,7 +39,8 @@ struct pl_tracer {
     pl_walk walk; /* of pl_trace_surface */
     pl_chain chain;
     double *texture; /* values that code fills in */
-    pl_path scratch;
+    pl_path scratch, spare;
+    pl_items items;
     struct pl_hit_list *list;
 };
 

@@ -17,8 +17,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
-from .binding import ACCELERATORS, ANTIALIAS, CHANNELS, PlChannels, PlError, PlHits, PlOptions, PlRenderOptions
-from .binding import PlStatistics, Progress, library, pointer
+from .binding import ACCELERATORS, ANTIALIAS, CHANNELS, INSTRUCTION_SETS, PlChannels, PlError, PlHits, PlOptions
+from .binding import PlRenderOptions, PlStatistics, Progress, library, pointer
 from .errors import PlsysRuntimeError, RuntimeArgumentError
 
 if TYPE_CHECKING:
@@ -67,7 +67,9 @@ class Scene:
     accelerator: "auto" (bvh), "none" (the paper's chapter 2), "boxes" (chapter 3), "grid" (chapter 4) or
     "bvh"; all give the same hits. grid: voxels of "grid" along x, y and z (None: 16, 16, 8).
     memory: bytes that states and structures may take (None: chosen by the machine). threads: None for one a core.
-    povray_epsilon: POV-Ray's hit and shadow tolerances when rendering. PlsysRuntimeError for bytes that aren't valid
+    povray_epsilon: POV-Ray's hit and shadow tolerances when rendering. isa ("scalar", "avx2", "avx512") and front_items
+    (2**64 - 1: all): the instruction set and the items a front of bvh may have, which the machine and the memory decide
+    otherwise; no result depends on them. PlsysRuntimeError for bytes that aren't valid
     bytecode, scenes that can't be derived, and limits.
     """
 
@@ -79,6 +81,8 @@ class Scene:
         threads: int | None = None,
         povray_epsilon: bool = False,
         grid: tuple[int, int, int] | None = None,
+        isa: str = "auto",
+        front_items: int | None = None,
     ) -> None:
         self._handle: int | None = None
         self._users = 0
@@ -91,6 +95,8 @@ class Scene:
             memory=_count("memory", memory, 0, 2**63 - 1),
             povray_epsilon=bool(povray_epsilon),
             grid=_voxels(grid),
+            isa=_choice("isa", isa, INSTRUCTION_SETS),
+            front_items=_count("front_items", front_items, 0, UNKNOWN),
         )
         error = PlError()
         self._handle = library().pl_scene_create(data, len(data), ctypes.byref(options), ctypes.byref(error))

@@ -218,7 +218,11 @@ static bool add_item(builder *b, uint8_t kind, uint32_t what)
                     .no_shadow = walk->at.no_shadow,
                     .what = what,
                     .transform_count = walk->at.marks[0],
-                    .term_count = walk->at.terms};
+                    .term_count = walk->at.terms,
+                    .rule = walk->at.rule,
+                    .texture = (int32_t)walk->at.marks[2] - 1,
+                    .texture_transforms = walk->at.marks[3],
+                    .texture_code = walk->at.marks[4]};
     if (kind == PL_NODE_PRIMITIVE) memcpy(item.arguments, walk->arguments, sizeof item.arguments);
     item.transforms = keep(b, b->chain.data, item.transform_count * sizeof *item.transforms);
     item.terms = keep(b, walk->path.terms, item.term_count * sizeof *item.terms);
@@ -255,7 +259,11 @@ static bool derive_items(builder *b)
         case PL_EVENT_TRANSFORM:
             if (!remember_transform(b)) return false;
             break;
-        case PL_EVENT_TEXTURE: break;
+        case PL_EVENT_TEXTURE:
+            b->walk.at.marks[2] = b->walk.node + 1;
+            b->walk.at.marks[3] = b->walk.at.marks[0];
+            b->walk.at.marks[4] |= program->nodes[b->walk.node].as.texture.code != 0;
+            break;
         case PL_EVENT_ENTER:
             if (!add_item(b, PL_NODE_ENTER, program->nodes[b->walk.node].as.enter.symbol)) return false;
             break;

@@ -28,7 +28,17 @@ typedef struct pl_item {
     const uint32_t *terms;                 /* union terms within this application */
     double arguments[PL_SHAPE_ARGUMENTS];
     uint64_t first; /* primitives of this state before this item */
+    int32_t rule;                /* the innermost rule within this application, -1: none */
+    int32_t texture;             /* the innermost texture node within it, -1: none … */
+    uint32_t texture_transforms; /* … below so many of the transformations */
+    bool texture_code;           /* a texture of the application has values to be computed from parameters */
 } pl_item;
+
+/* The items on the way from the scene to a leaf. */
+typedef struct pl_items {
+    const pl_item **list;
+    size_t count, capacity;
+} pl_items;
 
 typedef struct pl_state {
     uint32_t symbol; /* node; UINT32_MAX: the scene */
@@ -75,6 +85,8 @@ uint64_t pl_states_locate(const pl_states *states, const pl_path *path);
 pl_box pl_item_box(const pl_states *states, const pl_item *item, pl_reach *reach);
 /* Of an item in its own frame, below its transformations. */
 pl_reach pl_item_reach(const pl_states *states, const pl_item *item);
+/* The box of an item's bounded primitives under a map that has the item's own transformations in it. */
+pl_box pl_box_under(const pl_states *states, const pl_item *item, const pl_affine *map);
 bool pl_item_unbounded(const pl_states *states, const pl_item *item);
 uint64_t pl_item_primitives(const pl_states *states, const pl_item *item);
 

@@ -29,7 +29,8 @@ typedef struct pl_hit {
     double bound;       /* error bound of t; NaN until known */
     uint64_t primitive; /* index in derivation order */
     int32_t part;       /* of the shape: a face, or a mesh's triangle */
-    pl_path path;
+    pl_path path;       /* where the accelerator has no trail */
+    pl_path trail;      /* the accelerator's own way to the leaf (accel.h); the path follows from it */
 } pl_hit;
 
 /* What shading needs to know of a hit, found by walking its path once more with all parameters. */
@@ -68,7 +69,8 @@ double pl_hit_epsilon(const pl_surface *surface, const pl_ray *ray, double t);
 
 /* The tracer's counters of the last primary ray (for the extra channels) and totals. */
 typedef struct pl_counters {
-    uint64_t box_tests, primitive_tests;
+    uint64_t box_tests, primitive_tests; /* primitive_tests: in double */
+    uint64_t filtered, instances;        /* primitives tried in single precision; instances entered */
     uint32_t miss_depth; /* deepest recursion depth at which a box was missed, since last reset */
 } pl_counters;
 pl_counters *pl_tracer_counters(pl_tracer *tracer);

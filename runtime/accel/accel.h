@@ -29,20 +29,24 @@ typedef struct pl_query {
     bool found, done;    /* done: no more leaves are wanted */
     pl_hit *hit;         /* nearest: the best so far */
     struct pl_hit_list *list; /* all */
-    pl_path *scratch;
+    pl_path *scratch, *spare;
+    pl_items *items; /* scratch, like them */
+    const pl_scene *scene;
     pl_error *error;
 } pl_query;
 
 /* The error of a ray that reached one of the limits on steps; returns false. */
 bool pl_query_fail_steps(const pl_query *query, uint64_t limit);
 
-/* A candidate. path writes its union terms from the root when they are needed. */
+/* A candidate. Where it is: path writes its union terms from the root; or trail the accelerator's own way to it, from
+ * which pl_accel.items gives the items on its path. */
 typedef struct pl_leaf {
     uint32_t shape; /* unused when mesh is set */
     const double *arguments;
     const pl_mesh_tree *mesh;
     uint64_t primitive;
-    bool (*path)(const void *source, pl_path *path);
+    bool (*path)(const void *source, pl_path *path); /* NULL: there is a trail */
+    bool (*trail)(const void *source, pl_path *trail);
     const void *source;
 } pl_leaf;
 
@@ -59,7 +63,12 @@ struct pl_accel {
     void (*work_destroy)(void *work);
     /* Offers all leaves that matter. false: an error. */
     bool (*trace)(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
+    /* The items from the scene's to the leaf's at a trail; NULL: its hits have paths. false: no memory. */
+    bool (*items)(const pl_scene *scene, const pl_path *trail, pl_items *items);
 };
+
+/* The union terms of items, one after another. false: no memory. */
+bool pl_items_path(const pl_items *items, pl_path *path);
 
 extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh, pl_accel_grid;
 

@@ -1,8 +1,4 @@
-/* bvh.c - traversal of the shared states: a stack of instances, each with the ray in its own frame.
- *
- * A frame is an instance of a state on the way from the root; an entry of the stack is a node or item of a frame that
- * is still to be visited. Entries are visited depth first, near ones first, so the frames in use form a stack as well:
- * when an entry is taken, all frames above its own are done. Both stacks grow on the heap and drop nothing. */
+/* bvh.c - the default accelerator: fronts (front.h), filtered in single precision by a kernel, evaluated in double here. */
 #include "bvh.h"
 
 #include <stdlib.h>
@@ -10,214 +6,253 @@
 
 #include "../error.h"
 
-typedef struct frame {
-    const pl_state *state;
-    const pl_bvh_tree *tree;
-    const pl_item *item; /* of the parent frame's state; NULL at the root */
-    uint32_t parent, depth;
-    uint64_t first; /* primitives before this instance */
-    double o[3], d[3];
-    pl_slab slab;
-} frame;
-
-typedef struct pending {
-    double t_entry;
-    uint32_t frame;
-    int32_t reference;
-} pending;
-
-typedef struct work {
-    frame *frames;
-    pending *stack;
-    size_t frame_count, frame_capacity, stack_count, stack_capacity;
-} work;
+/* --- working memory --- */
 
 static void *work_create(const pl_scene *scene, pl_error *error)
 {
     (void)scene;
-    work *w = calloc(1, sizeof *w);
-    if (!w) pl_fail_memory(error, "preparing to trace");
+    pl_bvh_work *w = calloc(1, sizeof *w);
+    if (!w || !pl_bvh_grow_frames(w, 0, error) || !pl_bvh_grow_stack(w, 0, error)) {
+        free(w);
+        pl_fail_memory(error, "preparing to trace");
+        return NULL;
+    }
     return w;
 }
 
 static void work_destroy(void *memory)
 {
-    work *w = memory;
+    pl_bvh_work *w = memory;
     if (!w) return;
     free(w->frames);
     free(w->stack);
+    free(w->chain);
     free(w);
 }
 
-static bool push(work *w, pending entry, pl_error *error)
+static bool grow(void *array, size_t least, size_t *capacity, size_t element, pl_error *error)
 {
-    if (w->stack_count == w->stack_capacity) {
-        size_t capacity = w->stack_capacity ? 2 * w->stack_capacity : 64;
-        pending *stack = realloc(w->stack, capacity * sizeof *stack);
-        if (!stack) return pl_fail_memory(error, "tracing a ray");
-        w->stack = stack;
-        w->stack_capacity = capacity;
-    }
-    w->stack[w->stack_count++] = entry;
+    void **place = array, *data;
+    if (least <= *capacity) return true;
+    size_t more = 2 * least + 16;
+    if (!(data = realloc(*place, more * element))) return pl_fail_memory(error, "tracing a ray");
+    *place = data;
+    *capacity = more;
     return true;
 }
 
-/* The frame at the end of the stack, uninitialised. Moves the others, so pointers to frames don't survive. */
-static frame *push_frame(work *w, pl_error *error)
+bool pl_bvh_grow_frames(pl_bvh_work *w, size_t count, pl_error *error)
 {
-    if (w->frame_count == w->frame_capacity) {
-        size_t capacity = w->frame_capacity ? 2 * w->frame_capacity : 32;
-        frame *frames = realloc(w->frames, capacity * sizeof *frames);
-        if (!frames) {
-            pl_fail_memory(error, "tracing a ray");
-            return NULL;
-        }
-        w->frames = frames;
-        w->frame_capacity = capacity;
-    }
-    return &w->frames[w->frame_count++];
+    return grow(&w->frames, count + 1, &w->frame_capacity, sizeof *w->frames, error);
 }
 
-/* Pushes what a frame begins with: its tree's root and, on top, what has no bounds. */
-static bool begin_frame(const pl_scene *scene, work *w, uint32_t index, uint32_t state, double t_entry, pl_query *query)
+bool pl_bvh_grow_stack(pl_bvh_work *w, size_t top, pl_error *error)
 {
-    frame *f = &w->frames[index];
-    f->state = &scene->states.list[state];
-    f->tree = (const pl_bvh_tree *)scene->structure + state;
-    f->slab = pl_slab_of(f->o, f->d, pl_reach_slack(&f->state->reach, f->o));
-    if (f->tree->root != PL_BVH_NOTHING && !push(w, (pending){t_entry, index, f->tree->root}, query->error))
-        return false;
-    for (uint32_t i = f->tree->unbounded_count; i-- > 0;)
-        if (!push(w, (pending){query->t_min, index, ~f->tree->unbounded[i]}, query->error)) return false;
-    return true;
+    return grow(&w->stack, top + 64, &w->stack_capacity, sizeof *w->stack, error);
 }
 
-/* Tests a node's children and pushes those that the ray meets, the nearest last. */
-static bool visit_node(work *w, const frame *f, uint32_t index, const pl_bvh_node *node, pl_query *query,
-                       pl_counters *counters)
+/* --- entering an instance --- */
+
+/* A ray that can't be told in single precision meets everything. */
+static void give_up_filtering(pl_frame *f, double t_min)
 {
-    const pl_slab *slab = &f->slab;
-    double entry[PL_BVH_WIDTH], leave[PL_BVH_WIDTH];
-    for (int i = 0; i < PL_BVH_WIDTH; i++) entry[i] = query->t_min, leave[i] = query->t_max;
+    f->t0 = t_min;
+    f->rate = 0.0;
+    f->slack = 1e30f;
     for (int axis = 0; axis < 3; axis++) {
-        const double *near_plane = node->planes[slab->negative[axis]][axis];
-        const double *far_plane = node->planes[!slab->negative[axis]][axis];
-        double near_origin = slab->near_origin[axis], far_origin = slab->far_origin[axis], by = slab->inverse[axis];
-        for (int i = 0; i < PL_BVH_WIDTH; i++) {
-            double t_near = (near_plane[i] - near_origin) * by, t_far = (far_plane[i] - far_origin) * by;
-            entry[i] = t_near > entry[i] ? t_near : entry[i];
-            leave[i] = t_far < leave[i] ? t_far : leave[i];
-        }
+        f->origin[axis] = f->direction[axis] = 0.0f;
+        f->inverse[axis] = 1.0f;
     }
-    pending met[PL_BVH_WIDTH];
-    int count = 0;
-    for (int i = 0; i < PL_BVH_WIDTH && node->child[i] != PL_BVH_NOTHING; i++) {
-        counters->box_tests++;
-        if (!(entry[i] <= leave[i])) {
-            if (f->depth > counters->miss_depth) counters->miss_depth = f->depth;
-            continue;
-        }
-        int place = count++;
-        for (; place > 0 && met[place - 1].t_entry < entry[i]; place--) met[place] = met[place - 1];
-        met[place] = (pending){entry[i], index, node->child[i]};
-    }
-    for (int i = 0; i < count; i++)
-        if (!push(w, met[i], query->error)) return false;
-    return true;
 }
 
-/* A position on the stack of frames, and the item at its end. */
-typedef struct source {
-    const work *work;
-    uint32_t frame;
-    const pl_item *item;
-} source;
-
-/* The union terms from the root: the items' terms of the chain of frames, written from the end. */
-static bool write_path(const void *context, pl_path *path)
+/* In the unit frame a hit lies outside its exact box by no more than `slack`: the rounding of the chain below (reach.h,
+ * twice: boxes here are composed too), of the ray above (error), of moving to t0; and of single precision, where all
+ * numbers are about 1: 2^-19 is some 30 roundings. */
+bool pl_frame_begin(pl_frame *f, double t_min, double t_max)
 {
-    const source *s = context;
-    uint32_t length = s->item->term_count, index = s->frame;
-    for (; s->work->frames[index].item; index = s->work->frames[index].parent)
-        length += s->work->frames[index].item->term_count;
-    path->length = 0;
-    if (length > path->capacity) {
-        uint32_t *terms = realloc(path->terms, length * sizeof *terms);
-        if (!terms) return false;
-        path->terms = terms;
-        path->capacity = length;
+    const pl_front *front = f->front;
+    double distance = sqrt(f->o[0] * f->o[0] + f->o[1] * f->o[1] + f->o[2] * f->o[2]);
+    double slack = f->error + DBL_EPSILON * (2.0 * (front->reach.gain * distance + front->reach.base) +
+                                             16.0 * (distance + front->reach.size));
+    pl_slab slab = pl_slab_of(f->o, f->d, slack);
+    f->mapped = false;
+    if (front->root == PL_NOTHING || !pl_slab_hits(&slab, &front->box, t_min, t_max, &f->t0)) {
+        give_up_filtering(f, t_min);
+        return false;
     }
-    path->length = length;
-    const pl_item *item = s->item;
-    for (index = s->frame; item; index = s->work->frames[index].parent) {
-        length -= item->term_count;
-        memcpy(path->terms + length, item->terms, item->term_count * sizeof *item->terms);
-        item = s->work->frames[index].item;
+    double largest = fmax(fabs(f->d[0]), fmax(fabs(f->d[1]), fabs(f->d[2])));
+    double origin[3], most = 0.0;
+    f->rate = largest * front->scale;
+    for (int axis = 0; axis < 3; axis++) {
+        origin[axis] = (f->o[axis] + f->t0 * f->d[axis] - front->centre[axis]) * front->scale;
+        most += fabs(origin[axis]);
+    }
+    double unit_slack = 1.001 * slack * front->scale + 0x1p-19 * (1.0 + most);
+    if (!(f->rate > 1e-200 && f->rate < 1e200 && unit_slack < 1e6)) {
+        give_up_filtering(f, t_min);
+        return true;
+    }
+    f->slack = (float)unit_slack;
+    double shrink = 1.0 / largest;
+    for (int axis = 0; axis < 3; axis++) {
+        f->origin[axis] = (float)origin[axis];
+        /* A direction that hardly moves along an axis still has an inverse: within the front it moves by less than
+         * the slack either way. */
+        float d = (float)(f->d[axis] * shrink);
+        if (!(fabsf(d) > 1e-18f)) d = copysignf(1e-18f, d);
+        f->direction[axis] = d;
+        f->inverse[axis] = 1.0f / d;
     }
     return true;
 }
 
-/* An item of a frame: a leaf is tested, a state becomes a frame. */
-static bool visit_item(pl_tracer *tracer, const pending *at, const pl_item *item, pl_query *query)
+/* --- candidates --- */
+
+/* Maps a ray from a front's state to an item of an opened node, one transformation after another. */
+static bool map_down(pl_bvh_work *w, const pl_front *front, uint32_t opened, const pl_item *item, double o[3],
+                     double d[3], pl_error *error)
 {
-    work *w = tracer->work;
-    const pl_scene *scene = tracer->scene;
-    if (query->shadow && item->no_shadow) return true;
-    const frame *parent = &w->frames[at->frame];
-    uint64_t first = pl_add_saturating(parent->first, item->first);
-    uint32_t depth = parent->depth + 1;
-    double o[3], d[3];
-    memcpy(o, parent->o, sizeof o);
-    memcpy(d, parent->d, sizeof d);
+    size_t count = 0;
+    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent]) {
+        if (count >= w->chain_capacity && !grow(&w->chain, count + 1, &w->chain_capacity, sizeof *w->chain, error))
+            return false;
+        w->chain[count++] = at->item;
+    }
+    while (count > 0) {
+        const pl_item *at = w->chain[--count];
+        for (uint32_t i = 0; i < at->transform_count; i++) pl_map_ray(at->transforms[i], o, d);
+    }
     for (uint32_t i = 0; i < item->transform_count; i++) pl_map_ray(item->transforms[i], o, d);
-    if (item->kind != PL_NODE_ENTER) {
-        source s = {w, at->frame, item};
-        pl_leaf leaf = {.arguments = item->arguments, .primitive = first, .path = write_path, .source = &s};
-        if (item->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[item->what];
-        else leaf.shape = item->what;
-        tracer->counters.primitive_tests++;
-        return pl_query_leaf(query, &leaf, o, d);
-    }
-    uint32_t index = (uint32_t)w->frame_count;
-    frame *f = push_frame(w, query->error);
-    if (!f) return false;
-    f->item = item;
-    f->parent = at->frame;
-    f->depth = depth;
-    f->first = first;
-    memcpy(f->o, o, sizeof o);
-    memcpy(f->d, d, sizeof d);
-    return begin_frame(scene, w, index, item->what, at->t_entry, query);
+    return true;
 }
+
+static const pl_item *item_of(const pl_scene *scene, const pl_front *front, uint32_t opened, uint32_t item)
+{
+    return &scene->states.list[front->opened[opened].state].items[item & ~PL_NO_SHADOW];
+}
+
+static const pl_item *instance_item(const pl_scene *scene, const pl_front *front, uint32_t instance)
+{
+    const pl_front_instance *it = &front->instances[instance];
+    return item_of(scene, front, it->opened, it->item);
+}
+
+/* The normative ray of a frame, from the deepest frame above that has one. */
+static bool map_frame(const pl_scene *scene, pl_bvh_work *w, uint32_t index, pl_error *error)
+{
+    uint32_t from = index;
+    while (!w->frames[from].mapped) from--;
+    for (; from < index; from++) {
+        const pl_frame *parent = &w->frames[from];
+        pl_frame *f = &w->frames[from + 1];
+        memcpy(f->normative_o, parent->normative_o, sizeof f->normative_o);
+        memcpy(f->normative_d, parent->normative_d, sizeof f->normative_d);
+        if (!map_down(w, parent->front, parent->front->instances[f->instance].opened,
+                      instance_item(scene, parent->front, f->instance), f->normative_o, f->normative_d, error))
+            return false;
+        f->mapped = true;
+    }
+    return true;
+}
+
+/* A leaf's place: frames 1 … frame, then a primitive. */
+typedef struct place {
+    const pl_scene *scene;
+    const pl_bvh_work *work;
+    uint32_t frame;
+    pl_ref ref;
+} place;
+
+static bool write_trail(const void *source, pl_path *trail)
+{
+    const place *p = source;
+    uint32_t length = 0;
+    for (uint32_t i = 1; i <= p->frame; i++)
+        if (!pl_path_push(trail, length++, p->work->frames[i].instance)) return false;
+    if (!pl_path_push(trail, length++, p->ref)) return false;
+    trail->length = length;
+    return true;
+}
+
+bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query)
+{
+    pl_bvh_work *w = tracer->work;
+    const pl_scene *scene = tracer->scene;
+    pl_frame *f = &w->frames[frame];
+    const pl_front *front = f->front;
+    const pl_front_primitive *primitive = &front->primitives[ref & PL_REF_INDEX];
+    const pl_item *item = item_of(scene, front, primitive->opened, primitive->item);
+    double o[3], d[3];
+    if (!f->mapped && !map_frame(scene, w, frame, query->error)) return false;
+    memcpy(o, f->normative_o, sizeof o);
+    memcpy(d, f->normative_d, sizeof d);
+    if (!map_down(w, front, primitive->opened, item, o, d, query->error)) return false;
+    place p = {scene, w, frame, ref};
+    uint64_t within = pl_add_saturating(front->opened[primitive->opened].first, item->first);
+    pl_leaf leaf = {
+        .shape = item->what,
+        .arguments = item->arguments,
+        .mesh = item->kind == PL_NODE_MESH ? scene->meshes[item->what] : NULL,
+        .primitive = pl_add_saturating(f->first, within),
+        .trail = write_trail,
+        .source = &p,
+    };
+    tracer->counters.primitive_tests++;
+    return pl_query_leaf(query, &leaf, o, d);
+}
+
+/* --- from a trail to the items on the path --- */
+
+static bool add_items(pl_items *items, const pl_front *front, uint32_t opened, const pl_item *last)
+{
+    size_t begin = items->count, count = 1;
+    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent]) count++;
+    if (begin + count > items->capacity) {
+        size_t capacity = 2 * (begin + count) + 16;
+        const pl_item **list = realloc(items->list, capacity * sizeof *list);
+        if (!list) return false;
+        items->list = list;
+        items->capacity = capacity;
+    }
+    items->count = begin + count;
+    items->list[begin + --count] = last;
+    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent])
+        items->list[begin + --count] = at->item;
+    return true;
+}
+
+static bool trail_items(const pl_scene *scene, const pl_path *trail, pl_items *items)
+{
+    const pl_fronts *fronts = scene->structure;
+    const pl_front *front = &fronts->list[0];
+    items->count = 0;
+    for (uint32_t i = 0; i + 1 < trail->length; i++) {
+        const pl_front_instance *instance = &front->instances[trail->terms[i]];
+        if (!add_items(items, front, instance->opened, instance_item(scene, front, trail->terms[i]))) return false;
+        front = &fronts->list[instance->front];
+    }
+    const pl_front_primitive *leaf = &front->primitives[trail->terms[trail->length - 1] & PL_REF_INDEX];
+    return add_items(items, front, leaf->opened, item_of(scene, front, leaf->opened, leaf->item));
+}
+
+/* --- which kernel --- */
 
 static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
 {
-    work *w = tracer->work;
-    w->frame_count = w->stack_count = 0;
-    frame *root = push_frame(w, query->error);
-    if (!root) return false;
-    memset(root, 0, sizeof *root);
-    memcpy(root->o, ray->origin, sizeof root->o);
-    memcpy(root->d, ray->direction, sizeof root->d);
-    if (!begin_frame(tracer->scene, w, 0, 0, query->t_min, query)) return false;
-    for (uint64_t steps = 0; w->stack_count && !query->done; steps++) {
-        if (steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
-        pending at = w->stack[--w->stack_count];
-        if (at.t_entry > query->t_max) continue;
-        w->frame_count = at.frame + 1;
-        const frame *f = &w->frames[at.frame];
-        bool ok = at.reference >= 0
-                      ? visit_node(w, f, at.frame, &f->tree->nodes[at.reference], query, &tracer->counters)
-                      : visit_item(tracer, &at, &f->state->items[~at.reference], query);
-        if (!ok) return false;
+    switch (tracer->scene->isa) {
+#ifdef __x86_64__
+    case PL_ISA_AVX512: return pl_bvh_trace_avx512(tracer, ray, query);
+    case PL_ISA_AVX2: return pl_bvh_trace_avx2(tracer, ray, query);
+#endif
+    default: return pl_bvh_trace_scalar(tracer, ray, query);
     }
-    return true;
 }
 
 const pl_accel pl_accel_bvh = {.name = "bvh",
                                .states = true,
-                               .build = pl_bvh_build,
-                               .destroy = pl_bvh_destroy,
+                               .build = pl_fronts_build,
+                               .destroy = pl_fronts_destroy,
                                .work_create = work_create,
                                .work_destroy = work_destroy,
-                               .trace = trace};
+                               .trace = trace,
+                               .items = trail_items};

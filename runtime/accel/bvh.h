@@ -1,28 +1,45 @@
-/* bvh.h - a 4-wide tree of boxes a state, over the state's items in the state's own frame.
+/* bvh.h - traversal of fronts: frames, the kernels that filter, and the evaluation of what they leave.
  *
- * bvh_build.c fills it, bvh.c traverses it. References (`child`, `root`): >= 0 a node of the same tree, PL_BVH_NOTHING,
- * else ~item. */
+ * kernel.h holds the traversal; kernel_*.c compile it for an instruction set each. bvh.c has what is evaluated in double
+ * and doesn't depend on the instruction set: entering an instance, and candidates. */
 #ifndef PL_BVH_H
 #define PL_BVH_H
 
-#include "accel.h"
+#include "front.h"
 
-enum { PL_BVH_WIDTH = 4, PL_BVH_NOTHING = INT32_MIN };
+/* An instance of a front on the way from the root, with the ray in its frame. The ray comes down by composed matrices,
+ * which filter only; `error` bounds how far its points lie from those of the normative ray, which is mapped down the
+ * path one transformation after another when a candidate needs it. */
+typedef struct pl_frame {
+    const pl_front *front;
+    double o[3], d[3], error;
+    double t0, rate; /* local t: (t - t0) * rate, where the box begins at 0 and the front's size is about 1 */
+    float origin[3], direction[3], inverse[3]; /* in the unit frame, at t0 */
+    float slack;     /* no hit lies farther outside its item, in the unit frame */
+    uint32_t instance, depth;
+    uint64_t first;  /* primitives before it */
+    bool mapped;     /* normative_… are known */
+    double normative_o[3], normative_d[3];
+} pl_frame;
 
-typedef struct pl_bvh_node {
-    double planes[2][3][PL_BVH_WIDTH]; /* lo and hi; unused children have empty boxes */
-    int32_t child[PL_BVH_WIDTH];
-} pl_bvh_node;
+typedef struct pl_bvh_work {
+    pl_frame *frames;
+    uint64_t *stack; /* local t of entry as float bits, reference below */
+    const pl_item **chain;
+    size_t frame_capacity, stack_capacity, chain_capacity;
+} pl_bvh_work;
 
-typedef struct pl_bvh_tree {
-    const pl_bvh_node *nodes;
-    const int32_t *unbounded; /* items without bounds: always visited */
-    uint32_t node_count, unbounded_count;
-    int32_t root;
-} pl_bvh_tree;
+typedef bool pl_bvh_kernel(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
+extern pl_bvh_kernel pl_bvh_trace_scalar, pl_bvh_trace_avx2, pl_bvh_trace_avx512;
 
-/* One tree a state of scene->states, in memory of the states'. */
-bool pl_bvh_build(pl_scene *scene, pl_error *error);
-void pl_bvh_destroy(pl_scene *scene);
+/* Begins frame `index` with the ray of frames[index].o and .d; false if it misses the box. */
+bool pl_frame_begin(pl_frame *frame, double t_min, double t_max);
+
+/* Evaluates a primitive of a frame normatively and offers it. false: an error. */
+bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query);
+
+/* Room for one more frame, for eight more entries above `top`; false: no memory. */
+bool pl_bvh_grow_frames(pl_bvh_work *work, size_t count, pl_error *error);
+bool pl_bvh_grow_stack(pl_bvh_work *work, size_t top, pl_error *error);
 
 #endif

@@ -13,14 +13,47 @@ bool pl_query_fail_steps(const pl_query *query, uint64_t limit)
                    (unsigned long long)limit);
 }
 
+bool pl_items_path(const pl_items *items, pl_path *path)
+{
+    uint32_t length = 0;
+    for (size_t i = 0; i < items->count; i++)
+        for (uint32_t k = 0; k < items->list[i]->term_count; k++)
+            if (!pl_path_push(path, length++, items->list[i]->terms[k])) return false;
+    path->length = length;
+    return true;
+}
+
+static bool trail_path(const pl_query *query, const pl_path *trail, pl_path *path)
+{
+    return query->scene->accel->items(query->scene, trail, query->items) && pl_items_path(query->items, path);
+}
+
+/* A leaf's path in union terms; where it has a trail, that too. */
+static bool leaf_path(const pl_query *query, const pl_leaf *leaf, pl_path *trail, pl_path *path)
+{
+    if (leaf->path) return leaf->path(leaf->source, path);
+    return leaf->trail(leaf->source, trail) && trail_path(query, trail, path);
+}
+
+/* Whether a leaf at the same t comes before the hit in path order; -1: no memory. */
+static int comes_before(pl_query *query, const pl_leaf *leaf)
+{
+    pl_hit *hit = query->hit;
+    if (leaf->trail && !trail_path(query, &hit->trail, &hit->path)) return -1;
+    if (!leaf_path(query, leaf, query->spare, query->scratch)) return -1;
+    return pl_path_compare(query->scratch, &hit->path) < 0;
+}
+
 static bool keep_nearest(pl_query *query, const pl_leaf *leaf, const pl_root *root)
 {
     pl_hit *hit = query->hit;
     if (root->t == hit->t) {
-        if (!leaf->path(leaf->source, query->scratch)) return pl_fail_memory(query->error, "tracing a ray");
-        if (pl_path_compare(query->scratch, &hit->path) >= 0) return true;
+        int before = comes_before(query, leaf);
+        if (before < 0) return pl_fail_memory(query->error, "tracing a ray");
+        if (!before) return true;
     }
-    if (!leaf->path(leaf->source, &hit->path)) return pl_fail_memory(query->error, "tracing a ray");
+    if (!(leaf->trail ? leaf->trail(leaf->source, &hit->trail) : leaf->path(leaf->source, &hit->path)))
+        return pl_fail_memory(query->error, "tracing a ray");
     hit->t = root->t;
     hit->primitive = leaf->primitive;
     hit->part = root->part;
@@ -42,7 +75,7 @@ static bool keep_listed(pl_query *query, const pl_leaf *leaf, const pl_root *roo
         list->capacity = capacity;
     }
     pl_hit *hit = &list->hits[list->count];
-    if (!leaf->path(leaf->source, &hit->path)) return pl_fail_memory(query->error, "tracing a ray");
+    if (!leaf_path(query, leaf, &hit->trail, &hit->path)) return pl_fail_memory(query->error, "tracing a ray");
     hit->t = root->t;
     hit->primitive = leaf->primitive;
     hit->part = root->part;

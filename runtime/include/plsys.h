@@ -43,6 +43,7 @@ enum pl_error_code {
 };
 
 enum pl_accelerator { PL_AUTO = 0, PL_NONE, PL_BOXES, PL_BVH, PL_GRID };
+enum pl_isa { PL_ISA_AUTO = 0, PL_ISA_SCALAR, PL_ISA_AVX2, PL_ISA_AVX512 };
 
 typedef struct pl_options {
     int accelerator;     /* pl_accelerator */
@@ -50,6 +51,8 @@ typedef struct pl_options {
     size_t memory;       /* bytes for states and structures; 0: chosen automatically */
     bool povray_epsilon; /* POV-Ray's hit and shadow tolerances instead of ours */
     uint32_t grid[3];    /* of PL_GRID: voxels along x, y and z; all 0: 16, 16 and 8 */
+    int isa;             /* pl_isa: the instruction set of bvh's kernel; same hits from each */
+    uint64_t front_items; /* bvh: items a front may have, UINT64_MAX: all; 0: chosen by `memory` */
 } pl_options;
 
 typedef struct pl_scene pl_scene;

@@ -1,0 +1,200 @@
+/* surface.c - from a hit to what shading needs of it (trace.h, pl_trace_surface).
+ *
+ * Two ways to the same bits. A hit with a path is walked down once more, with all parameters. A hit with a trail knows
+ * the items on its path, whose transformations and textures the states have kept; only textures with values computed
+ * from parameters need the walk there too. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "accel/accel.h"
+#include "error.h"
+
+/* A point and direction in the frame at hand, and what finishing needs of the leaf. */
+typedef struct leaf_surface {
+    const double *o, *d;
+    const pl_shape *shape; /* NULL: a mesh */
+    const pl_mesh_tree *mesh;
+    const double *arguments;
+    uint32_t symbol; /* node, UINT32_MAX: none */
+    int32_t rule;
+    uint32_t depth;
+} leaf_surface;
+
+static bool remember(pl_chain *chain, const pl_transform *transform, pl_error *error)
+{
+    if (chain->count == chain->capacity) {
+        size_t capacity = chain->capacity ? 2 * chain->capacity : 32;
+        pl_affine *list = realloc(chain->list, capacity * sizeof *list);
+        if (!list) return pl_fail_memory(error, "shading a hit");
+        chain->list = list;
+        chain->capacity = capacity;
+    }
+    chain->list[chain->count++] = transform->to_object;
+    return true;
+}
+
+/* At a texture node: its values, with those that depend on parameters computed here, and the frame it stands in. */
+static bool take_texture(pl_tracer *tracer, double t, pl_surface *surface, pl_error *error)
+{
+    const pl_program *program = tracer->scene->program;
+    const pl_node *node = &program->nodes[tracer->walk.node];
+    const pl_record *record = &program->records[node->as.texture.texture];
+    const double *o = tracer->walk.at.payload, *d = o + 3;
+    for (int axis = 0; axis < 3; axis++) surface->pattern_point[axis] = o[axis] + t * d[axis];
+    surface->entries = record->entries;
+    surface->texture = record->values;
+    if (!node->as.texture.code) return true;
+    memcpy(tracer->texture, record->values, record->size * sizeof *tracer->texture);
+    surface->texture = tracer->texture;
+    tracer->walk.result.texture = tracer->texture;
+    return pl_run(program, tracer->walk.node, node->as.texture.code, &tracer->walk.scope, &tracer->walk.result, error);
+}
+
+/* The normal at the leaf, mapped back by the chain of inverse transposes, with its length kept in range, so that no scale
+ * however deep overflows (paper, section 2: only the foremost hit's normal is transformed back). */
+static void map_normal_back(const pl_tracer *tracer, double n[3])
+{
+    for (size_t i = tracer->chain.count + 1; i-- > 0;) {
+        double size = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
+        if (!(size > 0x1p-200 && size < 0x1p200))
+            for (int axis = 0; axis < 3; axis++) n[axis] /= size;
+        if (i > 0) pl_affine_normal(&tracer->chain.list[i - 1], n, n);
+    }
+    double size = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
+    for (int axis = 0; axis < 3; axis++) n[axis] /= size;
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (int axis = 0; axis < 3; axis++) n[axis] /= length;
+}
+
+static void finish_surface(pl_tracer *tracer, const leaf_surface *leaf, const pl_ray *ray, const pl_hit *hit,
+                           pl_surface *surface)
+{
+    double local[3];
+    for (int axis = 0; axis < 3; axis++) {
+        local[axis] = leaf->o[axis] + hit->t * leaf->d[axis];
+        surface->point[axis] = ray->origin[axis] + hit->t * ray->direction[axis];
+    }
+    if (leaf->mesh) pl_mesh_normal(leaf->mesh, hit->part, local, surface->normal);
+    else leaf->shape->normal(leaf->arguments, hit->part, local, surface->normal);
+    map_normal_back(tracer, surface->normal);
+    const pl_program *program = tracer->scene->program;
+    surface->symbol = leaf->symbol == UINT32_MAX ? -1 : (int32_t)program->nodes[leaf->symbol].symbol;
+    surface->rule = leaf->rule;
+    surface->depth = (int32_t)leaf->depth;
+}
+
+static void begin_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface)
+{
+    static const double plain[PL_TEXTURE_VALUES + PL_TEXTURE_ENTRY] = PL_TEXTURE_DEFAULTS;
+    tracer->chain.count = 0;
+    surface->texture = plain;
+    surface->entries = 1;
+    for (int axis = 0; axis < 3; axis++)
+        surface->pattern_point[axis] = ray->origin[axis] + hit->t * ray->direction[axis];
+}
+
+/* By the path: the derivation once more. */
+static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, const pl_path *path,
+                         pl_surface *surface, pl_error *error)
+{
+    pl_walk *walk = &tracer->walk;
+    double *o = walk->at.payload, *d = o + 3;
+    pl_walk_restart(walk, 0, NULL);
+    walk->follow = path;
+    begin_surface(tracer, ray, hit, surface);
+    memcpy(o, ray->origin, 3 * sizeof *o);
+    memcpy(d, ray->direction, 3 * sizeof *d);
+    leaf_surface leaf = {.o = o, .d = d};
+    for (bool found = false; !found;) {
+        switch (pl_walk_next(walk, error)) {
+        case PL_EVENT_ERROR: return false;
+        case PL_EVENT_END: return pl_fail(error, PL_ERROR_ARGUMENT, "path", "the path doesn't exist in this scene");
+        case PL_EVENT_TRANSFORM:
+            pl_map_ray(walk->transform, o, d);
+            if (!remember(&tracer->chain, walk->transform, error)) return false;
+            break;
+        case PL_EVENT_TEXTURE:
+            if (!take_texture(tracer, hit->t, surface, error)) return false;
+            break;
+        case PL_EVENT_PRIMITIVE:
+            leaf.shape = pl_shape_of(walk->shape);
+            leaf.arguments = walk->arguments;
+            found = true;
+            break;
+        case PL_EVENT_MESH:
+            leaf.mesh = tracer->scene->meshes[walk->mesh];
+            found = true;
+            break;
+        default: break;
+        }
+    }
+    leaf.symbol = walk->at.symbol;
+    leaf.rule = walk->at.rule;
+    leaf.depth = walk->at.depth;
+    finish_surface(tracer, &leaf, ray, hit, surface);
+    return true;
+}
+
+/* The texture that counts on a path of items: the innermost one. -1: none. */
+static int64_t innermost_texture(const pl_items *items, bool *code)
+{
+    int64_t innermost = -1;
+    *code = false;
+    for (size_t i = 0; i < items->count; i++) {
+        if (items->list[i]->texture >= 0) innermost = (int64_t)i;
+        *code = *code || items->list[i]->texture_code;
+    }
+    return innermost;
+}
+
+/* By the items on the path; `textured` is the one with the innermost texture. */
+static bool items_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, const pl_items *items,
+                          int64_t textured, pl_surface *surface, pl_error *error)
+{
+    const pl_scene *scene = tracer->scene;
+    double o[3], d[3];
+    leaf_surface leaf = {.o = o, .d = d, .symbol = UINT32_MAX, .rule = -1};
+    memcpy(o, ray->origin, sizeof o);
+    memcpy(d, ray->direction, sizeof d);
+    begin_surface(tracer, ray, hit, surface);
+    for (size_t i = 0; i < items->count; i++) {
+        const pl_item *item = items->list[i];
+        for (uint32_t k = 0; k <= item->transform_count; k++) {
+            if ((int64_t)i == textured && k == item->texture_transforms)
+                for (int axis = 0; axis < 3; axis++) surface->pattern_point[axis] = o[axis] + hit->t * d[axis];
+            if (k == item->transform_count) break;
+            pl_map_ray(item->transforms[k], o, d);
+            if (!remember(&tracer->chain, item->transforms[k], error)) return false;
+        }
+        if (item->rule >= 0) leaf.rule = item->rule;
+        if (item->kind == PL_NODE_ENTER) {
+            leaf.symbol = scene->states.list[item->what].symbol;
+            leaf.depth++;
+        }
+    }
+    if (textured >= 0) {
+        const pl_node *node = &scene->program->nodes[items->list[textured]->texture];
+        const pl_record *record = &scene->program->records[node->as.texture.texture];
+        surface->texture = record->values;
+        surface->entries = record->entries;
+    }
+    const pl_item *last = items->list[items->count - 1];
+    leaf.arguments = last->arguments;
+    if (last->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[last->what];
+    else leaf.shape = pl_shape_of(last->what);
+    finish_surface(tracer, &leaf, ray, hit, surface);
+    return true;
+}
+
+bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface, pl_error *error)
+{
+    const pl_accel *accel = tracer->scene->accel;
+    bool code;
+    if (!accel->items) return walk_surface(tracer, ray, hit, &hit->path, surface, error);
+    if (!accel->items(tracer->scene, &hit->trail, &tracer->items)) return pl_fail_memory(error, "shading a hit");
+    int64_t textured = innermost_texture(&tracer->items, &code);
+    if (!code) return items_surface(tracer, ray, hit, &tracer->items, textured, surface, error);
+    if (!pl_items_path(&tracer->items, &tracer->scratch)) return pl_fail_memory(error, "shading a hit");
+    return walk_surface(tracer, ray, hit, &tracer->scratch, surface, error);
+}
