@@ -23,6 +23,8 @@ from ..reading.source import Span
 from .context import Context, context_at
 from .document import Document, Meaning, Message, Outline, Place
 from .facts import Definition, Facts, Name, facts_of
+from .format import Formatted, format_document
+from .insights import GuardInsight, Insight, SymbolInsight, ValueInsight, insights_in, insights_of
 from .project import Project
 from .scene import Scene
 from .text import Block, Change, Text
@@ -30,6 +32,8 @@ from .whole import Checker, Result
 from .whole import run as check_whole
 
 __all__ = [
-    "CODES", "Block", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Meaning", "Message", "Name", "Outline",
-    "Place", "PlsysError", "Project", "Result", "Scene", "Span", "Text", "check_whole", "context_at", "facts_of", "nearest", "syntax", "vocabulary",
+    "Block", "CODES", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Formatted",
+    "GuardInsight", "Insight", "Meaning", "Message", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
+    "Scene", "Span", "SymbolInsight", "Text", "ValueInsight", "check_whole", "context_at", "facts_of",
+    "format_document", "insights_in", "insights_of", "nearest", "syntax", "vocabulary",
 ]  # fmt: skip

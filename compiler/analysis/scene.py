@@ -21,6 +21,8 @@ from typing import Callable, Iterable, Iterator
 
 from ..reading import syntax, vocabulary
 from ..reading.diagnostics import Diagnostic, Diagnostics, Note
+from ..reading.ignore import WORD as IGNORE_WORD
+from ..reading.ignore import Ignore, ignores, is_ignored
 from ..reading.model import Definition as ModelDefinition
 from ..reading.resolve import _Resolver
 from ..reading.resolve_names import ARTICLES, Entry, Names, _identity
@@ -121,8 +123,10 @@ class Scene:
         self.singles: dict[str, dict[Block, None]] = {name: {} for name in _SINGLE}
         self.whole: dict[Block, list[Diagnostic]] = {}  # messages of the whole-file checks
         self.forecast: dict | None = None  # their forecast, of the last text without errors
+        self.insights: dict[Block, list] = {}  # what they found to show beside the text: see insights.py
         self._messages: dict[Block, list[Diagnostic]] = {}  # of resolving
         self._syntax: dict[Block, list[Diagnostic]] = {}
+        self._ignoring: dict[Block, None] = {}  # blocks with `plsys-ignore` comments
         self._signatures: dict[str, object] = {}
         self._dirty: dict[Block, None] = {}
         self.entries: dict[str, Entry] = {}  # the namespace
@@ -167,7 +171,7 @@ class Scene:
 
     def _forget(self, block: Block, touched: dict[str, None]) -> None:
         facts = facts_of(block)
-        for table in (self._messages, self._syntax, self.whole, self._dirty):
+        for table in (self._messages, self._syntax, self.whole, self._dirty, self._ignoring):
             table.pop(block, None)
         for definition in (*facts.definitions, *facts.ghosts.values()):
             self.definers.get(definition.name, {}).pop(block, None)
@@ -184,6 +188,8 @@ class Scene:
         facts = facts_of(block)
         if facts.syntax:
             self._syntax[block] = facts.syntax
+        if IGNORE_WORD in block.data:
+            self._ignoring[block] = None
         for definition in (*facts.definitions, *facts.ghosts.values()):
             self.definers.setdefault(definition.name, {}).setdefault(block, []).append(definition)
             touched[definition.name] = None
@@ -340,7 +346,20 @@ class Scene:
             for table in tables:
                 found += [Message(d, base + d.span.start, base + d.span.end) for d in table.get(block, ())]
         found += self._second_ones(document)
-        return sorted(found, key=lambda message: (message.start, message.end))
+        ignored = self._ignores(document)
+        kept = [m for m in found if not is_ignored(m.diagnostic.code, m.diagnostic.severity, m.start, ignored)]
+        return sorted(kept, key=lambda message: (message.start, message.end))
+
+    def _ignores(self, document: Document) -> list[Ignore]:
+        """What `plsys-ignore` comments of ``document`` say. One at the end of a block may speak of the next one."""
+        found = []
+        text = document.text
+        for index in sorted(text.order[block] for block in self._ignoring if block in text.order):
+            base, length = text.starts[index], len(text.blocks[index].data)
+            data = b"".join(block.data for block in text.blocks[index : index + 2])
+            found += [each._replace(start=base + each.start, end=base + each.end)
+                      for each in ignores(data) if each.code_start < length]  # fmt: skip
+        return found
 
     def _second_ones(self, document: Document) -> Iterator[Message]:
         """Cameras and backgrounds after the first: a scene has one."""

@@ -26,6 +26,7 @@ from ..reading import syntax
 from ..reading.diagnostics import Diagnostic, Diagnostics, Note, PlsysError
 from ..reading.source import Source, Span
 from .facts import facts_of
+from .insights import Placed, kept, placed
 from .scene import Scene
 from .split import Shape
 from .text import Block
@@ -66,12 +67,13 @@ class Finding(NamedTuple):
 
 class Answer(NamedTuple):
     """``findings`` of the checks; ``forecast`` is None until it is known and where the scene has errors: a dict
-    with the numbers of graph.forecast.Forecast."""
+    with the numbers of graph.forecast.Forecast; so are ``insights``, what is shown beside the text."""
 
     key: int
     findings: tuple[Finding, ...]
     forecast: dict[str, Any] | None
     is_last: bool
+    insights: tuple[Placed, ...] | None = None
 
 
 @dataclass
@@ -102,6 +104,8 @@ class Result:
         scene = self.snapshot.scene
         scene.whole.clear()
         scene.forecast = self.answer.forecast or scene.forecast
+        if self.answer.insights is not None:
+            scene.insights = kept(self.answer.insights, self._span)
         for finding in self.answer.findings:
             block, span = self._span(*finding[:4])
             if scene.document_of(block) is None:
@@ -147,7 +151,10 @@ class Work:
                     return
                 answer(Answer(request.key, findings, None, False))
                 from ..graph.forecast import forecast
+                from ..graph.insights import insights
 
+                shown = placed(insights(model), place.of)
+                answer(Answer(request.key, findings, None, False, shown))
                 prediction = forecast(build_graph(model))
                 findings += tuple(place.finding(d) for d in prediction.diagnostics)
         except PlsysError:
