@@ -8,7 +8,7 @@ BIN := .venv/bin
 
 # What an installation is made of: a change in any of them installs again.
 SOURCES := pyproject.toml CMakeLists.txt README.md LICENSE grammar/src/parser.c \
-  $(shell find compiler runtime -name '*.py' -o -name '*.c' -o -name '*.h')
+  $(shell find compiler lsp runtime -name '*.py' -o -name '*.c' -o -name '*.h')
 RUNTIME_C := $(wildcard runtime/*.c runtime/shapes/*.c runtime/accel/*.c)
 CFLAGS_DEV := -std=gnu11 -O2 -g -Wall -Wextra -Werror -ffp-contract=off -fno-math-errno -fPIC -fvisibility=hidden -Iruntime -Iruntime/include
 
