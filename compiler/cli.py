@@ -16,6 +16,7 @@ import sys
 COMMANDS = {
     "render": "draw a scene",
     "check": "diagnostics, and how many primitives a scene has, without unfolding it",
+    "format": "lay out scenes: spaces, indentation, blank lines",
     "compile": "write the bytecode (.plsb) that `render` and `plsys-rt` read",
     "export": "write the unfolded scene for POV-Ray (.pov) or as a mesh (.obj)",
     "compare": "draw a scene here and in POV-Ray and compare the pictures",

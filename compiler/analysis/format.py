@@ -51,13 +51,13 @@ def format_document(document: Document, start: int = 0, end: int | None = None) 
         edits += [Edit(base + edit.start, base + edit.end, edit.data) for edit in found]
     if start > 0 or end < len(text):
         low, high = text.line_start(text.line_of(start)), text.line_start(text.line_of(end) + 1)
-        edits = [edit for edit in edits if _touches(edit, low, high)]
+        edits = [_within(edit, low) for edit in edits if low <= edit.end < high or edit.end == high == len(text)]
     return Formatted(document, edits, skipped)
 
 
 def line_end_of(document: Document) -> bytes:
     """What ends the document's first line."""
-    ends = (block.data[start - 2 : start] for block in document.text.blocks for start in block.line_starts[1:2])
+    ends = (block.data[max(0, start - 2) : start] for block in document.text.blocks for start in block.line_starts[1:2])
     first = next(ends, b"\n")
     return first if first == b"\r\n" else first[-1:]
 
@@ -71,7 +71,8 @@ def _edits_of(block: Block, line_end: bytes, is_first: bool, is_last: bool) -> l
     return kept[1]
 
 
-def _touches(edit: Edit, low: int, high: int) -> bool:
-    """Whether ``edit`` changes the lines from ``low`` to ``high``, which are starts of lines. The gap before a line is its
-    indentation, the one behind it belongs to the next."""
-    return low <= edit.end and edit.start < high and (edit.end < high or edit.start >= low) and not edit.start < low == edit.end
+def _within(edit: Edit, low: int) -> Edit:
+    """Of an edit of the gap before a line that starts at ``low``, the line's indentation."""
+    if edit.start >= low:
+        return edit
+    return Edit(low, edit.end, edit.data[len(edit.data.rstrip(b" ")) :])
