@@ -46,11 +46,13 @@ def placed(found: Insights, place: Callable[[Span], tuple[int, int, int, int]]) 
 def kept(
     found: Iterable[Placed], span_of: Callable[[int, int, int, int], tuple[Block, Span]]
 ) -> dict[Block, list[Shown]]:
-    """The insights by block, with offsets in it."""
+    """The insights by block, with offsets in it, in text order."""
     blocks: dict[Block, list[Shown]] = {}
     for each in found:
         block, span = span_of(*each.place)
         blocks.setdefault(block, []).append(Shown(span.start, span.end, each.insight))
+    for several in blocks.values():
+        several.sort(key=lambda shown: shown[:2])
     return blocks
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from plsys.compiler.analysis import check_whole
+from plsys.compiler.analysis import check_whole
 from plsys.lsp.session import Session
 
 CURSOR = "<cursor>"
@@ -103,6 +104,13 @@ class Editor:
         document = self.session.workspace.document(self.uri(name))
         check_whole(self.session.workspace.scene(document))
         return self.session.workspace.diagnostics(document)
+
+    def check_whole(self, name: str = "scene.plsys") -> None:
+        """Run the whole-file checks, here and now."""
+        workspace = self.session.workspace
+        scene = workspace.scene(workspace.document(self.uri(name)))
+        scene.work()
+        check_whole(scene)
 
     def codes(self, name: str = "scene.plsys") -> list[str]:
         return [each["code"] for each in self.published(name)]
