@@ -85,8 +85,8 @@ def test_shares_of_alternatives_and_drawn_values():
     assert hints(editor) == [
         "Selection A [1–2 primitives, about 1.25]",
         "Selection A { A -> 3 [75 %]",
-        "Selection A { A -> 3: [ roty 10 + 20*rand(0) ] box | 1 [25 %]",
         "Selection A { A -> 3: [ roty 10 + 20*rand(0) [10° … 30°]",
+        "Selection A { A -> 3: [ roty 10 + 20*rand(0) ] box | 1 [25 %]",
     ]
 
 
