@@ -1,0 +1,142 @@
+"""The other programs, each as a process of its own with its time and peak memory; None where one isn't installed.
+
+    >>> run(["povray", "+Itree.pov", …]).cpu
+    0.31
+
+Where a program is missing, MISSING says what to install; nothing is silently left out.
+"""
+
+from __future__ import annotations
+
+import ctypes.util
+import importlib.util
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+MISSING: dict[str, str] = {}
+PINNED = ("taskset", "-c", str(max(os.sched_getaffinity(0))))
+
+
+@dataclass
+class Run:
+    """wall, cpu: seconds · rss: peak bytes · text: what it printed."""
+
+    wall: float
+    cpu: float
+    rss: int
+    text: str
+
+
+def run(command: list, request: object = None, pinned: bool = True, folder: Path | None = None) -> Run:
+    """Runs a program to its end. RuntimeError with its last words if it fails."""
+    prefix = PINNED if pinned and shutil.which("taskset") else ()
+    with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as said:
+        if request is not None:
+            given.write(json.dumps(request).encode())
+            given.seek(0)
+        start = time.perf_counter()
+        process = subprocess.Popen([*prefix, *map(str, command)], stdin=given, stdout=said, stderr=subprocess.STDOUT, cwd=folder)
+        _, status, usage = os.wait4(process.pid, 0)
+        wall = time.perf_counter() - start
+        process.returncode = os.waitstatus_to_exitcode(status)
+        said.seek(0)
+        text = said.read().decode(errors="replace")
+    if process.returncode:
+        raise RuntimeError(f"{command[0]} failed ({process.returncode}): {text[-600:]}")
+    return Run(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024, text)
+
+
+def plsys(*arguments: object, pinned: bool = False) -> Run:
+    return run([sys.executable, "-m", "plsys.compiler.cli", *arguments], pinned=pinned)
+
+
+def ours(case, pinned: bool = True, **request) -> dict:
+    """work.py's answer for a case; a failure is {"failed": why}."""
+    request = {"scene": str(case.path), "parameters": case.parameters, "rays": str(case.rays_path), "repeats": 3,
+               "most_seconds": 2.0, "options": {}} | request  # fmt: skip
+    try:
+        done = run([sys.executable, HERE / "work.py"], request, pinned=pinned)
+    except RuntimeError as error:
+        return {"failed": str(error).strip().splitlines()[-1][:200]}
+    return json.loads(done.text) | {"process_rss": done.rss}
+
+
+# --- Embree ---
+
+
+@cache
+def embree_program(folder: Path) -> Path | None:
+    program = folder / "embree"
+    compiler = shutil.which("cc")
+    done = compiler and subprocess.run(
+        [compiler, "-O2", "-std=gnu11", "-o", program, HERE / "embree.c", "-ldl"], capture_output=True, text=True
+    )
+    if not done or done.returncode:
+        MISSING["embree"] = "Embree's header is missing: apt-get install libembree-dev"
+        return None
+    return program
+
+
+@cache
+def embree_libraries() -> dict[str, str]:
+    """Version → library."""
+    found = {}
+    library = ctypes.util.find_library("embree3")
+    if library:
+        found["3.13"] = library
+    else:
+        MISSING["embree 3.13"] = "apt-get install libembree-dev"
+    package = importlib.util.find_spec("embreex")
+    if package:
+        for path in Path(package.origin).parents[1].glob("embreex.libs/libembree4*"):
+            found["4.4"] = str(path)
+    if "4.4" not in found:
+        MISSING["embree 4.4"] = "pip install embreex"
+    return found
+
+
+def embree(case, scene: Path, folder: Path, version: str = "3.13", flags: str = "-", repeats: int = 3) -> dict | None:
+    """embree.c's answer, with t of all rays under "t", by set."""
+    program, library = embree_program(folder), embree_libraries().get(version)
+    if not program or not library:
+        return None
+    hits = folder / "embree-hits.bin"
+    done = run([program, library, scene, case.binary_rays_path, repeats, flags, hits])
+    answer = json.loads(done.text)
+    answer["sets"] = dict(zip(case.rays, answer["sets"]))
+    t, counts = np.fromfile(hits, np.float32).astype(float), [len(rays) for rays in case.rays.values()]
+    t[t > 1e29] = np.inf
+    answer["t"] = dict(zip(case.rays, np.split(t, np.cumsum(counts)[:-1])))
+    return answer | {"process_rss": done.rss}
+
+
+# --- POV-Ray ---
+
+
+def povray(case, folder: Path, width: int = 640, height: int = 480, threads: int | None = 1) -> dict | None:
+    """{"parse", "trace": seconds, "wall", "cpu", "rss", "file_bytes"} for a case's export."""
+    if not shutil.which("povray"):
+        MISSING["povray"] = "apt-get install povray"
+        return None
+    scene = folder / "povray.pov"
+    parameters = [x for name, value in case.parameters.items() for x in ("-D", f"{name}={value}")]
+    plsys("export", case.path, "-o", scene, *parameters)
+    command = ["povray", f"+I{scene}", f"+O{folder / 'povray.png'}", f"+W{width}", f"+H{height}", "-A", "-D", "+FN8"]
+    done = run([*command, *([f"+WT{threads}"] if threads else [])], pinned=threads == 1)
+    seconds = {
+        name.lower(): float(value)
+        for name, value in re.findall(r"(Parse|Trace) Time:.*?\(([\d.]+) seconds\)", done.text)
+    }
+    return seconds | {"wall": done.wall, "cpu": done.cpu, "rss": done.rss, "file_bytes": scene.stat().st_size}

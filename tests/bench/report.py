@@ -1,0 +1,112 @@
+"""The bench's results: rows with their targets, as a table, JSON and plots.
+
+    results.row("order 20", "coherent, of Embree single rays", [1.1, 1.2, 1.3], 1.0)
+    results.note("order 20", "Embree needs 214 MB")
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+
+@dataclass
+class Row:
+    """low, value, high: least, median and most of the rounds. target: at least that (`at_most`: at most); None: only
+    reported. ours, theirs: what the ratio is made of, for the reader."""
+
+    scene: str
+    what: str
+    low: float
+    value: float
+    high: float
+    unit: str
+    target: float | None
+    at_most: bool
+    ours: str = ""
+    theirs: str = ""
+
+    @property
+    def met(self) -> bool | None:
+        if self.target is None:
+            return None
+        return self.value <= self.target if self.at_most else self.value >= self.target
+
+    def line(self) -> str:
+        verdict = {None: "", True: "met", False: "NOT met"}[self.met]
+        target = "" if self.target is None else f"{'≤' if self.at_most else '≥'} {self.target:g}"
+        spread = f"{number(self.low)} … {number(self.high)}" if self.low != self.high else ""
+        parts = f"{self.scene:<14} {self.what:<46} {number(self.value):>8}{self.unit:<3} {spread:<19} {target:>8}  {verdict:<8}"
+        return f"{parts} {self.ours}{' : ' + self.theirs if self.theirs else ''}".rstrip()
+
+
+@dataclass
+class Results:
+    rows: list[Row] = field(default_factory=list)
+    notes: list[tuple[str, str]] = field(default_factory=list)
+    curves: dict[str, list[dict]] = field(default_factory=dict)
+
+    def row(self, scene: str, what: str, values, target: float | None = None, unit: str = "×", at_most: bool = False,
+            ours: str = "", theirs: str = "") -> None:  # fmt: skip
+        ordered = sorted(values if isinstance(values, (list, tuple)) else [values])
+        row = Row(scene, what, ordered[0], ordered[len(ordered) // 2], ordered[-1], unit, target, at_most, ours, theirs)
+        self.rows.append(row)
+        print(row.line(), flush=True)
+
+    def note(self, scene: str, text: str) -> None:
+        self.notes.append((scene, text))
+        print(f"{scene:<14} {text}", flush=True)
+
+    def write(self, path: Path, facts: dict) -> None:
+        rows = [asdict(row) | {"met": row.met} for row in self.rows]
+        path.write_text(json.dumps(facts | {"rows": rows, "notes": self.notes, "curves": self.curves}, indent=1) + "\n")
+
+    def plot(self, path: Path) -> str | None:
+        """Draws the curves; a message if it can't."""
+        try:
+            import matplotlib
+        except ImportError:
+            return "no plot: pip install matplotlib"
+        matplotlib.use("Agg")
+        from matplotlib import pyplot
+
+        figure, axes = pyplot.subplots(1, 3, figsize=(16, 5), layout="constrained")
+        for name, points in self.curves.items():
+            if name.startswith("fronts"):
+                for axis_set in ("coherent", "random"):
+                    axes[0].plot(
+                        [p["bytes"] / 1e6 for p in points], [p[axis_set] for p in points],
+                        "o-" if axis_set == "coherent" else "s--", label=f"{name[8:]}, {axis_set}",
+                    )  # fmt: skip
+            if name == "growth":
+                x = [p["primitives"] for p in points]
+                axes[1].plot(x, [p["bytes"] / 1e6 for p in points], "o-", label="memory, MB")
+                axes[1].plot(x, [p["build_seconds"] for p in points], "s--", label="build, s")
+                axes[1].plot(x, [p["coherent"] for p in points], "^:", label="coherent, Mray/s")
+            if name.startswith("threads"):
+                axes[2].plot([p["threads"] for p in points], [p["rate"] for p in points], "o-", label=name[9:])
+        for axis, title, x in zip(axes, ("Memory for time: items a front", "Growth: Menger 2 to 10", "Threads"), ("MB", "primitives", "threads")):
+            axis.set(title=title, xlabel=x)
+            if axis is not axes[2]:
+                axis.set_xscale("log")
+                axis.set_yscale("log")
+            if axis.lines:
+                axis.legend(fontsize=8)
+            axis.grid(alpha=0.3)
+        axes[0].set_ylabel("Mray/s, one core")
+        axes[2].set_ylabel("Mray/s")
+        figure.savefig(path, dpi=110)
+        pyplot.close(figure)
+        return None
+
+
+def number(value: float) -> str:
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def size(count: float) -> str:
+    for unit, name in ((1e9, "GB"), (1e6, "MB"), (1e3, "KB")):
+        if count >= unit:
+            return f"{count / unit:.3g} {name}"
+    return f"{count:.0f} B"
