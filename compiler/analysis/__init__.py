@@ -21,10 +21,12 @@ from ..reading.codes import CODES
 from ..reading.diagnostics import Diagnostic, PlsysError, nearest
 from ..reading.source import Span
 from .context import Context, context_at
+from . import queries
 from .document import Document, Meaning, Message, Outline, Place
 from .facts import Definition, Facts, Name, facts_of
 from .format import Formatted, format_document
 from .insights import GuardInsight, Insight, SymbolInsight, ValueInsight, insights_in, insights_of
+from .motion import Motion, motion_of
 from .project import Project
 from .scene import Scene
 from .text import Block, Change, Text
@@ -33,7 +35,7 @@ from .whole import run as check_whole
 
 __all__ = [
     "Block", "CODES", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Formatted",
-    "GuardInsight", "Insight", "Meaning", "Message", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
+    "GuardInsight", "Insight", "Meaning", "Message", "Motion", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
     "Scene", "Span", "SymbolInsight", "Text", "ValueInsight", "check_whole", "context_at", "facts_of",
-    "format_document", "insights_in", "insights_of", "nearest", "syntax", "vocabulary",
+    "format_document", "insights_in", "insights_of", "motion_of", "nearest", "queries", "syntax", "vocabulary",
 ]  # fmt: skip
