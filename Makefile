@@ -12,7 +12,7 @@ SOURCES := pyproject.toml CMakeLists.txt README.md LICENSE grammar/src/parser.c 
 RUNTIME_C := $(wildcard runtime/*.c runtime/shapes/*.c runtime/accel/*.c)
 CFLAGS_DEV := -std=gnu11 -O2 -g -Wall -Wextra -Werror -ffp-contract=off -fno-math-errno -fPIC -fvisibility=hidden -Iruntime -Iruntime/include
 
-.PHONY: render test help dev generate bench-lsp check-generated bless sanitize wheel clean
+.PHONY: render test help dev generate bench bench-lsp check-generated bless sanitize wheel clean
 
 render: .venv/.installed ## draw SCENE to OUT
 	$(BIN)/plsys render $(SCENE) -o $(OUT)
@@ -39,6 +39,11 @@ help: ## this list
 	$(BIN)/python -m pip install --quiet --no-build-isolation '.[test]'
 	touch $@
 
+# libembree-dev and povray are Debian's; the bench says what is missing.
+.venv/.bench: .venv/.installed pyproject.toml
+	$(BIN)/python -m pip install --quiet --no-build-isolation '.[bench]'
+	touch $@
+
 dev: runtime/libplsys.so compiler/libelementary.so compiler/libgrammar.so ## build the C parts in place, for PYTHONPATH use
 
 runtime/libplsys.so: $(RUNTIME_C) $(shell find runtime -name '*.h')
@@ -51,6 +56,9 @@ compiler/libgrammar.so: grammar/src/parser.c
 generate: ## write all generated files again
 	$(PYTHON) runtime/generate.py
 	$(PYTHON) grammar/generate.py
+
+bench: .venv/.bench ## measure plsys, Embree, POV-Ray and Mitsuba side by side (BENCH='--quick --only order20')
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python tests/bench/bench.py $(BENCH)
 
 bench-lsp: .venv/.tests ## measure the language server against its budgets
 	$(BIN)/python tests/bench/lsp.py
