@@ -15,11 +15,16 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .graph.graph import Graph, LeftOut
 from .reading.diagnostics import Diagnostic, Diagnostics, PlsysError, SceneError
+from .reading.ignore import kept
 from .reading.model import Model
 from .reading.source import Source
+
+if TYPE_CHECKING:
+    from .graph.forecast import Forecast
 
 # Nested Python calls while compiling; an expression nested deeper than some thousands isn't a scene.
 RECURSION_LIMIT = 20_000
@@ -65,7 +70,22 @@ def build(
         check_limits(graph, diagnostics)
         if diagnostics.has_errors:
             raise SceneError(diagnostics.sorted())
-    return Compilation(source, model, graph, diagnostics.sorted())
+    return Compilation(source, model, graph, kept(diagnostics.sorted()))
+
+
+def diagnose(
+    scene: str | Path | Source, parameters: Mapping[str, float] | None = None, seed: float | None = None
+) -> tuple[list[Diagnostic], Compilation | None, Forecast | None]:
+    """Everything that there is to say about a scene, as `plsys check` does; the compilation and its forecast are None
+    where it has errors. PlsysError for a file that can't be read."""
+    from .graph.forecast import forecast
+
+    try:
+        compilation = build(scene, parameters, seed)
+    except SceneError as error:
+        return kept(error.diagnostics), None, None
+    prediction = forecast(compilation.graph)
+    return [*compilation.diagnostics, *kept(prediction.diagnostics)], compilation, prediction
 
 
 def build_model(

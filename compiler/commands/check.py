@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from ..reading.diagnostics import PlsysError, SceneError
+from ..reading.diagnostics import PlsysError
 from .common import add_input_arguments, json_integer, print_json, read_source, show_diagnostics
 
 
@@ -26,18 +26,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _check(path: str, arguments: argparse.Namespace) -> tuple[dict, bool]:
     """The JSON entry of one file, and whether it has errors."""
-    from ..graph.forecast import forecast
-    from ..pipeline import build
+    from ..pipeline import diagnose
 
     prediction = None
     try:
         source = read_source(path)
-        compilation = build(source, parameters=dict(arguments.parameters), seed=arguments.seed)
-        prediction = forecast(compilation.graph)
-        diagnostics = [*compilation.diagnostics, *prediction.diagnostics]
-        prediction_json = _forecast_json(prediction, len(compilation.encode()))
-    except SceneError as error:
-        diagnostics, prediction_json = list(error.diagnostics), None
+        diagnostics, compilation, prediction = diagnose(source, dict(arguments.parameters), arguments.seed)
+        prediction_json = compilation and _forecast_json(prediction, len(compilation.encode()))
     except PlsysError as error:
         if not arguments.json:
             print(f"{error.place}: error: {error.reason}", file=sys.stderr)

@@ -13,12 +13,11 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from ..graph.forecast import forecast
+from ..graph.forecast import MOST_PRIMITIVES, forecast
 from ..graph.graph import Graph
 from ..reading.diagnostics import PlsysError
 from .unfold import SHAPE_NAMES, Instances, Unfolding
 
-MOST_PRIMITIVES = 100_000_000
 """Of an export: about 15 GB of text for POV-Ray, which needs ten times as much memory to read it."""
 
 

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import math
 
+from ..reading.affine import spectral_radius
 from .matrices import Matrix, multiply
 from .states import Derivation, State
 
 Edge = tuple[int, int, Matrix]
 MAX_CYCLES = 1000
-SQUARINGS = 40
 
 
 def contracts(component: list[State], derivation: Derivation) -> bool:
@@ -36,20 +36,6 @@ def stretch(m: Matrix) -> float:
     columns = [(m[c], m[4 + c], m[8 + c]) for c in range(3)]
     rows = (sum(abs(sum(a * b for a, b in zip(u, v))) for v in columns) for u in columns)
     return math.sqrt(max(rows))
-
-
-def spectral_radius(m: Matrix) -> float:
-    """The largest |eigenvalue| of the linear part, by Gelfand's formula |M^k|^(1/k) with k = 2^40."""
-    linear = [m[0:3], m[4:7], m[8:11]]
-    logarithm = 0.0  # of the k-th root of the factor taken out of the power
-    for i in range(SQUARINGS):
-        size = max(abs(value) for row in linear for value in row)
-        if size == 0:
-            return 0.0
-        logarithm += math.log(size) / 2**i
-        linear = [[value / size for value in row] for row in linear]
-        linear = [[sum(linear[r][k] * linear[k][c] for k in range(3)) for c in range(3)] for r in range(3)]
-    return math.exp(logarithm)
 
 
 def _has_growing_cycle(count: int, edges: list[tuple[int, int, float]]) -> bool:

@@ -30,6 +30,9 @@ MAX_DEPTH = 100_000
 MAX_ERRORS = 20
 PROOF_STATES = 2000
 
+# An export has at most so many; rendering has no such limit.
+MOST_PRIMITIVES = 100_000_000
+
 
 @dataclass
 class Forecast:
@@ -81,6 +84,7 @@ class _Forecaster:
                 self.count_chances(
                     min(self.max_states, PROOF_STATES) if found.limit == "depth" else self.max_states
                 )
+        self.report_expansion(result)
         result.infinite = bool(found.cyclic) and not self.diagnostics.has_errors
         result.diagnostics = self.diagnostics.sorted()
         return result
@@ -130,6 +134,20 @@ class _Forecaster:
         symbol = self.graph.nodes[next(iter(found.formulas))[0]]
         message = f"more than {self.max_states:,} states: their number isn't counted, errors in them aren't looked for"
         self.tell("state-limit", symbol.span, message)
+
+    def report_expansion(self, result: Forecast) -> None:
+        """What the back ends that unfold a scene would refuse."""
+        low, middle, _ = result.primitives_range
+        count = low if low == middle else middle
+        if count is None or count <= MOST_PRIMITIVES:
+            return
+        digits = 1 + int(int(count).bit_length() * 0.30103)
+        shown = f"{int(count):,}" if digits <= 15 else f"a number of about {digits} digits of"
+        message = f"the scene has {shown} primitives: rendering doesn't mind, but no export can write so many"
+        hint = f"an export has at most {MOST_PRIMITIVES:,}; -D sets a Parameter to a smaller value"
+        placing = (i for i in objects_of(self.graph) if self.derivation.start(i).enters)
+        span = next((self.graph.nodes[i].span for i in placing), None)
+        self.tell("expansion", span, message, hint)
 
     def report_cycles(self, found: Exploration) -> bool:
         """Whether a recursion without end doesn't contract."""

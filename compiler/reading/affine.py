@@ -19,6 +19,8 @@ from .model import Constant, Step
 Matrix = tuple[float, ...]
 Vector = tuple[float, ...]
 
+SQUARINGS = 40
+
 IDENTITY: Matrix = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
@@ -46,6 +48,36 @@ def determinant(matrix: Matrix) -> float:
     return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
+def spectral_radius(m: Matrix) -> float:
+    """The largest |eigenvalue| of the linear part, by Gelfand's formula |M^k|^(1/k) with k = 2^40."""
+    linear = [m[0:3], m[4:7], m[8:11]]
+    logarithm = 0.0  # of the k-th root of the factor taken out of the power
+    for i in range(SQUARINGS):
+        size = max(abs(value) for row in linear for value in row)
+        if size == 0:
+            return 0.0
+        logarithm += math.log(size) / 2**i
+        linear = [[value / size for value in row] for row in linear]
+        linear = [[sum(linear[r][k] * linear[k][c] for k in range(3)) for c in range(3)] for r in range(3)]
+    return math.exp(logarithm)
+
+
+def inverse(matrix: Matrix) -> Matrix | None:
+    """The map back, by the adjugate; None for a singular map."""
+    a, b, c, x, d, e, f, y, g, h, i, z = matrix
+    size = determinant(matrix)
+    if size == 0:
+        return None
+    rows = [(e * i - f * h, c * h - b * i, b * f - c * e),
+            (f * g - d * i, a * i - c * g, c * d - a * f),
+            (d * h - e * g, b * g - a * h, a * e - b * d)]  # fmt: skip
+    found: list[float] = []
+    for row in rows:
+        linear = [value / size for value in row]
+        found += [*linear, -sum(p * q for p, q in zip(linear, (x, y, z)))]
+    return tuple(found)
+
+
 def from_columns(x: Vector, y: Vector, z: Vector, origin: Vector) -> Matrix:
     """The map that takes the axes to x, y, z and the origin to ``origin``."""
     return tuple(column[row] for row in range(3) for column in (x, y, z, origin))
@@ -57,7 +89,7 @@ def columns(matrix: Matrix) -> tuple[Vector, Vector, Vector, Vector]:
 
 
 def of_step(step: Step) -> Matrix:
-    """The matrix of one step with constant arguments (the steps that POV-Ray's modifiers become)."""
+    """The matrix of one step with constant arguments."""
     values = [argument.value for argument in step.arguments if isinstance(argument, Constant)]
     if step.operation == "trans":
         return from_columns((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), tuple(values))
@@ -66,12 +98,30 @@ def of_step(step: Step) -> Matrix:
         return (x, 0.0, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, 0.0, z, 0.0)
     if step.operation == "matrix":
         return from_columns(*(tuple(values[3 * i : 3 * i + 3]) for i in range(4)))
-    sine, cosine = apply("sin", values), apply("cos", values)
+    if step.operation == "shear":
+        xy, xz, yx, yz, zx, zy = values
+        return (1.0, xy, xz, 0.0, yx, 1.0, yz, 0.0, zx, zy, 1.0, 0.0)
+    sine, cosine = apply("sin", values[:1]), apply("cos", values[:1])
+    if step.operation == "rot":
+        return _about(values[1:], sine, cosine)
     first, second = {"rotx": (1, 2), "roty": (2, 0), "rotz": (0, 1)}[step.operation]
     matrix = list(IDENTITY)
     matrix[5 * first], matrix[5 * second] = cosine, cosine
     matrix[4 * second + first], matrix[4 * first + second] = sine, -sine
     return tuple(matrix)
+
+
+def _about(axis: Sequence[float], sine: float, cosine: float) -> Matrix:
+    """The rotation about ``axis`` (of any length but 0), by Rodrigues' formula."""
+    size = math.hypot(*axis)
+    x, y, z = (value / size for value in axis)
+    rows = []
+    for i, cross_row in enumerate(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))):
+        for j in range(3):
+            outer = (x, y, z)[i] * (x, y, z)[j]
+            rows.append(outer * (1 - cosine) + (cosine if i == j else 0.0) + cross_row[j] * sine)
+        rows.append(0.0)
+    return tuple(rows)
 
 
 def of_steps(steps: Sequence[Step]) -> Matrix:

@@ -1,7 +1,7 @@
 """Scenes that can't work: semantic checks on the model.
 
 model.Model → diagnostics. resolve has made sure that every name means something; here is what only shows when
-rules, guards and parameters are looked at together. check_paths and check_recursion hold the two large checks.
+rules, guards and parameters are looked at together. The larger checks stand in check_*.py.
 
 Example::
 
@@ -14,6 +14,8 @@ from __future__ import annotations
 import math
 
 from . import affine
+from .check_camera import check_camera
+from .check_guards import check_guards
 from .check_paths import check_paths
 from .check_recursion import check_recursion
 from .diagnostics import Diagnostics
@@ -71,6 +73,8 @@ def check(model: Model, diagnostics: Diagnostics) -> None:
     if not diagnostics.has_errors:
         check_paths(model, diagnostics)
         check_recursion(model, diagnostics)
+        check_guards(model, diagnostics)
+        check_camera(model, diagnostics)
     checker.unused()
 
 
@@ -274,4 +278,12 @@ def _divide_by_zero(folded: Expression, lazy: bool = False) -> None:
 
 
 def _finite_hint(reason: str) -> str:
-    return "guard it: b != 0 ? a/b : 0" if "zero" in reason else ""
+    if "zero" in reason:
+        return "guard it: b != 0 ? a/b : 0"
+    hints = {
+        "sqrt(": "only numbers from 0 on have a square root: sqrt(max(x, 0))",
+        "log(": "only numbers above 0 have a logarithm: log(max(x, 0.001))",
+        "asin(": "asin takes -1 to 1: asin(clamp(x, -1, 1))",
+        "acos(": "acos takes -1 to 1: acos(clamp(x, -1, 1))",
+    }
+    return next((hint for start, hint in hints.items() if reason.startswith(start)), "")

@@ -10,7 +10,11 @@ at once or never.
 
 from __future__ import annotations
 
+from . import affine
+from .check_scaling import Back, check_scaling, linear_map
+from .check_termination import check_termination, cyclic
 from .diagnostics import Diagnostics
+from .linear import after, form
 from .model import (
     Apply,
     Assign,
@@ -25,8 +29,10 @@ from .model import (
     Production,
     Read,
     Symbol,
+    Transform,
+    Variants,
 )
-from .walk import Way, decided, draws, is_open, leaves, reached_symbols, reads, seed_of, ways
+from .walk import Way, components, decided, draws, is_open, leaves, reached_symbols, reads, seed_of, ways
 
 # An endless recursion is legal iff every way round it contracts, because then a detail cut-off ends it. No back end
 # has one yet. Once one has, the judgement is the forecast's, which knows the matrices of states (graph.contraction).
@@ -50,7 +56,7 @@ def check_recursion(model: Model, diagnostics: Diagnostics) -> None:
             if not CONTRACTING_IS_LEGAL:
                 _report_endless(members[0], members, diagnostics)
         else:
-            _check_cycle(members, component, seed, diagnostics)
+            _check_cycle(members, component, model, diagnostics)
 
 
 def _report_endless(symbol: Symbol, members: list[Symbol], diagnostics: Diagnostics) -> None:
@@ -101,14 +107,16 @@ def _ends(production: Production, ending: set[str], seed: float) -> bool:
 
 
 def _check_cycle(
-    members: list[Symbol], component: frozenset[str], seed: float, diagnostics: Diagnostics
+    members: list[Symbol], component: frozenset[str], model: Model, diagnostics: Diagnostics
 ) -> None:
     """A cycle that can be left: does something change on the way round that its guards look at?"""
-    back: list[tuple[Symbol, Way]] = []
+    seed = seed_of(model)
+    back: list[Back] = []
     for symbol in members:
         for way in ways(symbol.production):
             if isinstance(way.leaf, Enter) and way.leaf.symbol in component and is_open(way, seed):
-                back.append((symbol, way))
+                if not _is_dropped(way, seed):
+                    back.append((symbol, way))
     drawing = [
         (symbol, way) for symbol, way in back if way.weights or any(draws(test) for test, _ in way.guards)
     ]
@@ -127,18 +135,10 @@ def _check_cycle(
         diagnostics.add(
             "random-loop", span, message, "the number of its rounds has no limit; a counter would give one"
         )
+        check_scaling(back, seed, diagnostics)
         return
-    for symbol, way in back:
-        if len(members) == 1 and not way.operators and not _draws_before(way):
-            span = way.leaf.span or symbol.name_span
-            message = f"'{symbol.name}' leads back to itself with nothing changed: this never ends"
-            diagnostics.add(
-                "identity-cycle",
-                span,
-                message,
-                f"put an operator before it: [ --n; trans 0 0 1 ] {symbol.name}",
-            )
-            return
+    if _check_identity(back, diagnostics):
+        return
     if guards and not guards & changed and not drawing:
         symbol, way = back[0]
         span = way.leaf.span or symbol.name_span
@@ -147,12 +147,45 @@ def _check_cycle(
         diagnostics.add(
             "counter", span, message, f"change it on the way: [ --{sorted(guards)[0]} ] {symbol.name}"
         )
-        return
-    _check_direction(back, diagnostics)
+        check_scaling(back, seed, diagnostics)
+    elif not _check_direction(back, diagnostics):
+        check_termination(back, model, diagnostics)
 
 
-def _check_direction(back: list[tuple[Symbol, Way]], diagnostics: Diagnostics) -> None:
-    """A counter that every way round moves away from the guard that would end the recursion: `++n` under `n > 0`."""
+def _is_dropped(way: Way, seed: float) -> bool:
+    """Whether a constant transformation on the way is singular, so that nothing follows it."""
+    matrix = linear_map(way.operators, seed)
+    return matrix is not None and affine.determinant(matrix) == 0
+
+
+def _check_identity(back: list[Back], diagnostics: Diagnostics) -> bool:
+    """Whether some cycle changes nothing on its way, which is reported."""
+    idle = cyclic([each for each in back if not _draws_before(each[1]) and not _has_effect(each[1])])
+    if not idle:
+        return False
+    symbol, way = idle[0]
+    through = sorted({other.name for other, _ in idle} - {symbol.name})
+    passing = f" (through {', '.join(map(repr, through))})" if through else ""
+    message = f"'{symbol.name}' leads back to itself with nothing changed{passing}: this never ends"
+    hint = f"put an operator before it: [ --n; trans 0 0 1 ] {way.leaf.symbol}"
+    diagnostics.add("identity-cycle", way.leaf.span or symbol.name_span, message, hint)
+    return True
+
+
+def _has_effect(way: Way) -> bool:
+    """Whether operators on the way change a parameter, the random key or the place. (Textures are no part of a state.)"""
+    for operator in way.operators:
+        if isinstance(operator, Calculate):
+            if any(isinstance(statement, Variants) for statement in operator.statements):
+                return True
+        elif isinstance(operator, Transform) and linear_map([operator], 0.0) != affine.IDENTITY:
+            return True
+    return any(found != form(Read(name), {}) for name, found in after(way.operators).items())
+
+
+def _check_direction(back: list[Back], diagnostics: Diagnostics) -> bool:
+    """Whether every way round moves a counter away from the guard that would end the recursion, `++n` under `n > 0`,
+    which is reported."""
     for symbol, way in back:
         for test, needed in way.guards:
             if not (needed and isinstance(test, Apply) and test.operation in UNBOUNDED):
@@ -170,10 +203,11 @@ def _check_direction(back: list[tuple[Symbol, Way]], diagnostics: Diagnostics) -
                 )
                 span = test.span or symbol.name_span
                 diagnostics.add("counter", span, message, f"count the other way: {other}{name}")
-                return
+                return True
+    return False
 
 
-def _direction(back: tuple[Symbol, Way], name: str) -> int | None:
+def _direction(back: Back, name: str) -> int | None:
     """1 or -1 if the way moves the parameter by constants of that sign only, else None."""
     signs = set()
     for operator in back[1].operators:
@@ -204,38 +238,3 @@ def _assigned(way: Way) -> set[str]:
         for statement in operator.statements
         if isinstance(statement, Assign)
     }
-
-
-def components(edges: dict[str, set[str]]) -> list[frozenset[str]]:
-    """The strongly connected components (Tarjan 1972), without recursion so that long chains are fine."""
-    order: dict[str, int] = {}
-    low: dict[str, int] = {}
-    stack: list[str] = []
-    found: list[frozenset[str]] = []
-    for root in edges:
-        if root in order:
-            continue
-        work = [(root, iter(sorted(edges[root])))]
-        order[root] = low[root] = len(order)
-        stack.append(root)
-        while work:
-            name, successors = work[-1]
-            for other in successors:
-                if other not in edges:
-                    continue
-                if other not in order:
-                    order[other] = low[other] = len(order)
-                    stack.append(other)
-                    work.append((other, iter(sorted(edges[other]))))
-                    break
-                if other in stack:
-                    low[name] = min(low[name], order[other])
-            else:
-                work.pop()
-                if work:
-                    low[work[-1][0]] = min(low[work[-1][0]], low[name])
-                if low[name] == order[name]:
-                    at = stack.index(name)
-                    found.append(frozenset(stack[at:]))
-                    del stack[at:]
-    return found

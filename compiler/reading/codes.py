@@ -38,6 +38,10 @@ CODES: dict[str, Code] = {
     "endless": Code("error", "A recursion that can't end."),
     "counter": Code("warning", "A recursion whose guard reads nothing that the recursion changes."),
     "identity-cycle": Code("error", "A recursion that changes nothing on its way."),
+    "steps-over": Code("warning", "A counter that steps over the one value that its guard waits for."),
+    "unproven": Code("info", "A recursion of which no proof was found that it ends."),
+    "diverging": Code("warning", "A recursion without a bound that makes things larger with every round."),
+    "slow-contraction": Code("info", "A recursion without a bound that makes things hardly smaller with every round."),
     "no-rule": Code("warning", "A Selection of which no rule can apply."),
     "constant-guard": Code("warning", "A guard that is always true or always false."),
     "singular": Code("warning", "A constant transformation that flattens what it acts on; its subtree is dropped."),
@@ -48,10 +52,14 @@ CODES: dict[str, Code] = {
     "no-camera": Code("info", "A scene without a camera can't be rendered."),
     "no-object": Code("info", "A scene without an object has nothing to show."),
     "no-light": Code("info", "A scene without a light shows ambient light only."),
+    "camera-inside": Code("warning", "A camera inside of a shape in which no light is."),
     "colour-range": Code("info", "A colour whose components look like 0 to 255 instead of 0 to 1."),
     "radians": Code("info", "An angle that looks like radians; angles are degrees."),
     # what the derivation meets, and limits
     "limit": Code("error", "A limit of the bytecode: values at a time, or draws in one application."),
     "depth-limit": Code("error", "A path of the derivation that enters more symbols than the forecast follows."),
     "state-limit": Code("info", "More states than the forecast counts."),
+    "expansion": Code("info", "A scene that has too many primitives to be written out for another program."),
+    # comments to the compiler
+    "ignore": Code("warning", "A `plsys-ignore` comment that names no warning or info."),
 }

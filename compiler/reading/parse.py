@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from . import mistakes, syntax
 from .diagnostics import Diagnostics
 from .grammar import syntax_tree
+from .ignore import check_ignores
 from .parse_definitions import DEFINITIONS, DefinitionReader
 from .parse_values import Abandon, Reading, is_stray
 from .source import Source, Span
@@ -42,6 +43,7 @@ def convert(source: Source, text: bytes, tree: Tree, diagnostics: Diagnostics) -
     reader = _FileReader(source, text, diagnostics)
     reader.file(tree)
     mistakes.extras(reader.reading, tree)
+    check_ignores(source, text, diagnostics)
     diagnostics.items[:] = diagnostics.sorted()
     return syntax.File(Span(source, 0, len(source.data)), tuple(reader.definitions))
 

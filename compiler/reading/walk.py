@@ -193,3 +193,38 @@ def is_open(way: Way, seed: float) -> bool:
 def seed_of(model: Model) -> float:
     """The scene's seed."""
     return dict(model.settings.values).get("seed", (0.0,))[0] if model.settings is not None else 0.0
+
+
+def components(edges: dict[str, set[str]]) -> list[frozenset[str]]:
+    """The strongly connected components (Tarjan 1972), without recursion so that long chains are fine."""
+    order: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found: list[frozenset[str]] = []
+    for root in edges:
+        if root in order:
+            continue
+        work = [(root, iter(sorted(edges[root])))]
+        order[root] = low[root] = len(order)
+        stack.append(root)
+        while work:
+            name, successors = work[-1]
+            for other in successors:
+                if other not in edges:
+                    continue
+                if other not in order:
+                    order[other] = low[other] = len(order)
+                    stack.append(other)
+                    work.append((other, iter(sorted(edges[other]))))
+                    break
+                if other in stack:
+                    low[name] = min(low[name], order[other])
+            else:
+                work.pop()
+                if work:
+                    low[work[-1][0]] = min(low[work[-1][0]], low[name])
+                if low[name] == order[name]:
+                    at = stack.index(name)
+                    found.append(frozenset(stack[at:]))
+                    del stack[at:]
+    return found
