@@ -46,6 +46,7 @@ class PlOptions(ctypes.Structure):
         ("povray_epsilon", c_bool),
         ("grid", c_uint32 * 3),
         *(("isa", c_int), ("front_items", c_uint64)),
+        ("detail", c_double),
     ]
 
 
@@ -103,6 +104,9 @@ class PlStatistics(ctypes.Structure):
         *((f"seconds_{name}", c_double) for name in ("verify", "build", "trace")),
         ("accelerator", c_int),
         ("threads", c_int),
+        ("detail", c_double),
+        ("cut_instances", c_uint64),
+        ("cut_max_error", c_double),
     ]
 
 

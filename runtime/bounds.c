@@ -87,18 +87,32 @@ pl_box pl_box_under(const pl_states *states, const pl_item *item, const pl_affin
 
 pl_reach pl_item_reach(const pl_states *states, const pl_item *item)
 {
-    if (item->kind == PL_NODE_ENTER) return states->list[item->what].reach;
+    if (item->kind == PL_NODE_ENTER) return states->list[item->what].gate;
     pl_box box = item->kind == PL_NODE_MESH ? *pl_mesh_box(states->meshes[item->what])
                                             : pl_shape_box(pl_shape_of(item->what), item->arguments, NULL);
     return pl_reach_leaf(pl_box_is_finite(&box) ? 1.7320508075688774 * pl_box_reach(&box) : 0.0);
 }
 
-pl_box pl_item_box(const pl_states *states, const pl_item *item, pl_reach *reach)
+static pl_affine item_map(const pl_states *states, const pl_item *item, pl_reach *reach)
 {
-    pl_affine identity = pl_affine_identity(), map = compose(&identity, item);
+    pl_affine identity = pl_affine_identity();
     *reach = pl_item_reach(states, item);
     for (uint32_t i = item->transform_count; i-- > 0;) *reach = pl_reach_through(item->transforms[i], reach);
+    return compose(&identity, item);
+}
+
+pl_box pl_item_box_tight(const pl_states *states, const pl_item *item, pl_reach *reach)
+{
+    pl_affine map = item_map(states, item, reach);
     return pl_box_under(states, item, &map);
+}
+
+pl_box pl_item_box(const pl_states *states, const pl_item *item, pl_reach *reach)
+{
+    if (!states->cuts || item->kind != PL_NODE_ENTER) return pl_item_box_tight(states, item, reach);
+    pl_affine map = item_map(states, item, reach);
+    pl_box box = pl_box_map(&map, &states->list[item->what].box);
+    return has_nan(&box) ? pl_box_everything() : box;
 }
 
 /* The item of a state whose terms stand at path[at …]; items are in path order. */
@@ -121,17 +135,17 @@ static const pl_item *find_item(const pl_state *state, const pl_path *path, uint
     return NULL;
 }
 
-uint64_t pl_states_locate(const pl_states *states, const pl_path *path)
+uint64_t pl_states_locate(const pl_states *states, const pl_path *path, uint32_t depth)
 {
     const pl_state *state = &states->list[0];
     uint64_t primitive = 0;
     uint32_t at = 0;
-    for (;;) {
+    for (uint32_t entered = 1;; entered++) {
         const pl_item *item = find_item(state, path, at);
         if (!item) return UINT64_MAX;
         primitive = pl_add_saturating(primitive, item->first);
         at += item->term_count;
-        if (item->kind != PL_NODE_ENTER) return primitive;
+        if (item->kind != PL_NODE_ENTER || entered == depth) return primitive;
         state = &states->list[item->what];
     }
 }

@@ -76,3 +76,9 @@ void pl_camera_direction(const pl_camera *camera, double x, double y, int width,
         direction[axis] = camera->forward[axis] + across * camera->right[axis] + above * camera->up[axis];
     pl_normalize(direction);
 }
+
+double pl_camera_spread(const pl_camera *camera, int width, int height)
+{
+    const double across = length(camera->right) / width, down = length(camera->up) / height;
+    return (across > down ? across : down) / length(camera->forward);
+}

@@ -60,6 +60,7 @@ typedef struct pl_walk {
     const pl_program *program;
     /* Options, to be set after pl_walk_begin. */
     bool announce;         /* report PL_EVENT_NODE */
+    bool stretches;        /* find the stretch of computed transformations too */
     const pl_path *follow; /* take only these terms at unions */
 
     /* The event. */

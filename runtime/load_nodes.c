@@ -1,6 +1,7 @@
 /* load_nodes.c - the nodes of bytecode and their places in the source (see reader.h). */
 #include <string.h>
 
+#include "reach.h"
 #include "reader.h"
 #include "table.h"
 
@@ -68,6 +69,7 @@ static uint32_t read_matrix(pl_reader *r, pools *p)
         pl_transform *transform = &p->transforms[p->transform_count];
         transform->to_parent = matrix;
         transform->singular = !pl_affine_inverse(&matrix, &transform->to_object);
+        transform->stretch = pl_largest_stretch(&matrix);
     }
     return p->transform_count++;
 }

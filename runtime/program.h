@@ -58,6 +58,7 @@ typedef struct pl_case {
 typedef struct pl_transform {
     pl_affine to_parent; /* object to parent, as in the file */
     pl_affine to_object; /* the inverse; unspecified if singular */
+    double stretch;      /* the largest singular value of to_parent, rounded up; set where detail cut-offs need it */
     bool singular;       /* the subtree below is to be dropped and counted */
 } pl_transform;
 

@@ -185,6 +185,7 @@ bool pl_render(pl_scene *scene, const pl_render_options *options, const pl_chann
     pl_error_clear(error);
     pl_view view;
     if (!check(scene, options, channels, error) || !pl_view_create(&view, scene, error)) return false;
+    view.spread = pl_camera_spread(&view.camera, options->width, options->height);
     const uint32_t columns = (uint32_t)(options->width + PL_TILE - 1) / PL_TILE;
     const uint32_t rows = (uint32_t)(options->height + PL_TILE - 1) / PL_TILE;
     pl_job job = {

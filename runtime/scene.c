@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "accel/accel.h"
+#include "cut.h"
 #include "error.h"
 #include "table.h"
 
@@ -102,6 +103,8 @@ static bool check_options(const pl_options *options, pl_error *error)
                        MOST_THREADS);
     if (options->isa < PL_ISA_AUTO || options->isa > best_isa())
         return pl_fail(error, PL_ERROR_ARGUMENT, "isa", "this machine doesn't have instruction set number %d", options->isa);
+    if (isnan(options->detail) || isinf(options->detail))
+        return pl_fail(error, PL_ERROR_ARGUMENT, "detail", "%g isn't a number of pixels", options->detail);
     return check_grid(options->grid, error);
 }
 
@@ -148,29 +151,54 @@ static uint64_t generated(const pl_states *states)
     return root->primitives == UINT64_MAX ? UINT64_MAX : root->primitives - own;
 }
 
+/* PX of an endless scene unless something else is asked for. */
+#define ENDLESS_DETAIL 0.5
+
+/* The states, where the accelerator or a cut-off needs them. Without either they are explored all the same, since an endless
+ * scene has a cut-off in every accelerator; what is wrong with a finite one is then met while tracing. */
+static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
+{
+    pl_states *states = &scene->states;
+    pl_error ignored = {.code = PL_OK};
+    const double asked = scene->options.detail;
+    const bool needed = scene->accel->states || asked > 0.0;
+    if (!pl_states_build(states, scene->program, scene->meshes, scene->accel->node_boxes, limit,
+                         needed ? error : &ignored))
+        return !needed;
+    const bool endless = states->list[0].endless;
+    if (!needed && !endless) {
+        pl_states_free(states);
+        return true;
+    }
+    scene->detail = asked > 0.0 ? asked : asked == 0.0 && endless ? ENDLESS_DETAIL : 0.0;
+    states->cuts = endless || scene->detail > 0.0;
+    /* A voxel's state is entered without the gates above it, which count where there are cut-offs. */
+    if (states->cuts && scene->accel == &pl_accel_grid) scene->accel = &pl_accel_boxes;
+    if (states->cuts && scene->accel == &pl_accel_bvh) scene->accel = &pl_accel_gated;
+    return !states->cuts || pl_coverage_build(states, error);
+}
+
 static bool build(pl_scene *scene, pl_error *error)
 {
     double start = pl_seconds();
-    const pl_accel *accel = scene->accel;
     size_t limit = scene->options.memory ? scene->options.memory : default_memory();
     if (!build_meshes(scene, error) || !find_rule_places(scene, error)) return false;
-    if (accel->states &&
-        !pl_states_build(&scene->states, scene->program, scene->meshes, accel->node_boxes, limit, error))
-        return false;
-    if (accel->build && !accel->build(scene, error)) return false;
+    if (!build_states(scene, limit, error)) return false;
+    if (scene->accel->build && !scene->accel->build(scene, error)) return false;
     scene->all_opaque = is_opaque(scene->program);
 
     pl_statistics *counts = &scene->statistics;
     counts->primitives = UINT64_MAX;
-    if (accel->states) {
+    if (scene->states.count) {
         const pl_state *root = &scene->states.list[0];
         counts->primitives = generated(&scene->states);
         counts->singular = root->singular;
-        counts->depth = root->depth;
+        counts->depth = root->endless ? UINT64_MAX : root->depth;
         counts->states = scene->states.count - 1; /* the scene itself is none */
     }
     counts->scene_bytes = sizeof *scene + scene->program->bytes + scene->mesh_bytes + scene->states.bytes;
-    counts->accelerator = accelerator_ids[scene->options.accelerator];
+    counts->detail = scene->detail;
+    counts->accelerator = scene->accel == &pl_accel_boxes ? PL_BOXES : accelerator_ids[scene->options.accelerator];
     counts->threads = scene->threads;
     counts->seconds_build = pl_seconds() - start;
     return true;
@@ -303,6 +331,8 @@ void pl_scene_count(pl_scene *scene, const pl_tracer *tracer, const pl_ray_count
     counts->rays_transmitted += rays->transmitted;
     counts->bailout += rays->bailout;
     counts->trace_level += rays->trace_level;
+    counts->cut_instances += tracer->counters.cuts;
+    counts->cut_max_error = fmax(counts->cut_max_error, tracer->counters.cut_error);
     pthread_mutex_unlock(&scene->lock);
 }
 

@@ -18,6 +18,7 @@ struct pl_scene {
     void *structure; /* the accelerator's */
     size_t mesh_bytes;
     pl_options options;
+    double detail; /* footprints below which instances are cut; 0: only where rounding ends an endless recursion */
     int threads;
     bool all_opaque;
     int isa; /* of the accelerator's kernel: pl_isa */

@@ -11,6 +11,7 @@ them. A Scene may be used by several threads; after close() every call is a Plsy
 from __future__ import annotations
 
 import ctypes
+import math
 import operator
 import threading
 from collections.abc import Callable, Iterator
@@ -69,7 +70,8 @@ class Scene:
     memory: bytes that states and structures may take (None: chosen by the machine). threads: None for one a core.
     povray_epsilon: POV-Ray's hit and shadow tolerances when rendering. isa ("scalar", "avx2", "avx512") and front_items
     (2**64 - 1: all): the instruction set and the items a front of bvh may have, which the machine and the memory decide
-    otherwise; no result depends on them. PlsysRuntimeError for bytes that aren't valid
+    otherwise; no result depends on them. detail: pixel footprints below which instances are drawn as boxes when rendering (0:
+    never; None: never, but 0.5 in endless scenes). PlsysRuntimeError for bytes that aren't valid
     bytecode, scenes that can't be derived, and limits.
     """
 
@@ -83,6 +85,7 @@ class Scene:
         grid: tuple[int, int, int] | None = None,
         isa: str = "auto",
         front_items: int | None = None,
+        detail: float | None = None,
     ) -> None:
         self._handle: int | None = None
         self._users = 0
@@ -97,6 +100,7 @@ class Scene:
             grid=_voxels(grid),
             isa=_choice("isa", isa, INSTRUCTION_SETS),
             front_items=_count("front_items", front_items, 0, UNKNOWN),
+            detail=_detail(detail),
         )
         error = PlError()
         self._handle = library().pl_scene_create(data, len(data), ctypes.byref(options), ctypes.byref(error))
@@ -283,19 +287,21 @@ class Scene:
 
         primitives (that symbols generate; None: more than 2⁶⁴, or unknown as without states), states, depth (symbols on a path), scene_bytes,
         singular (dropped subtrees), box_tests, primitive_tests, bailout, trace_level, rays {primary, shadow, reflection,
-        transmitted}, seconds {verify, build, trace}, accelerator, threads.
+        transmitted}, seconds {verify, build, trace}, accelerator, threads, detail (the cut-off in pixels, 0: none), cut {instances: rays
+        that ended at a cut instance's box, max_error: the largest error bound of their distance, in scene units}.
         """
         counts = PlStatistics()
         with self._open() as handle:
             library().pl_scene_statistics(handle, ctypes.byref(counts))
-        result: dict = {"rays": {}, "seconds": {}}
+        result: dict = {"rays": {}, "seconds": {}, "cut": {}}
         for name, _ in PlStatistics._fields_:
             group, _, member = name.partition("_")
             place = result[group] if group in result else result
             place[member if group in result else name] = getattr(counts, name)
         result["accelerator"] = ACCELERATORS[counts.accelerator]
-        if counts.primitives == UNKNOWN:
-            result["primitives"] = None
+        for name in ("primitives", "depth"):
+            if result[name] == UNKNOWN:
+                result[name] = None
         return result
 
     def symbol_name(self, symbol: int) -> str:
@@ -359,6 +365,19 @@ def _voxels(grid: object) -> tuple[int, int, int]:
     if len(sides) != 3:
         raise RuntimeArgumentError("grid", f"expected three numbers of voxels, not {grid!r}")
     return tuple(_count("grid", side, 0 if grid is None else 1, 2**26) for side in sides)
+
+
+def _detail(value: object) -> float:
+    """pl_options' detail: there 0 is automatic and what is below 0 is none."""
+    if value is None:
+        return 0.0
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise RuntimeArgumentError("detail", f"expected a number of pixels, not {value!r}") from None
+    if not 0 <= number < math.inf:
+        raise RuntimeArgumentError("detail", f"{value} isn't a number of pixels, 0 or more")
+    return number or -1.0
 
 
 def _rays(origins, directions) -> tuple[np.ndarray, np.ndarray]:

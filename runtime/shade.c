@@ -25,6 +25,7 @@
 typedef struct pl_bounce {
     double origin[3], direction[3], t_min;
     double share[3]; /* of the sample's colour that the ray's colour counts for */
+    double width;    /* of the pixel's footprint at the origin; it goes on growing by the view's spread */
     double weight;   /* POV-Ray's measure of it: the product of largest channels */
     uint32_t level;
 } pl_bounce;
@@ -44,6 +45,7 @@ typedef struct pl_spotted {
     const pl_bounce *ray;
     double point[3], normal[3]; /* turned against the ray */
     double cosine;              /* of the angle between ray and normal, at least 0 */
+    double width;               /* of the pixel's footprint here */
     double epsilon;             /* rounding error of the point, in our own tolerances */
     pl_pigment pigment;
     pl_finish finish;
@@ -178,7 +180,7 @@ static bool shadow_light(pl_shader *shader, const pl_spotted *at, const double t
                          double distance, double color[3], pl_error *error)
 {
     const pl_view *view = shader->view;
-    pl_ray ray = {.shadow = true};
+    pl_ray ray = {.shadow = true, .width = at->width, .spread = view->spread};
     memcpy(ray.origin, at->point, sizeof ray.origin);
     memcpy(ray.direction, towards, sizeof ray.direction);
     ray.t_min = view->povray_epsilon ? POVRAY_SHADOW : at->epsilon / fmax(cosine, STEEPEST);
@@ -263,7 +265,7 @@ static bool follow(pl_shader *shader, const pl_spotted *at, const double factor[
                    pl_error *error)
 {
     const pl_view *view = shader->view;
-    pl_bounce next = {.weight = at->ray->weight * largest, .level = at->ray->level};
+    pl_bounce next = {.width = at->width, .weight = at->ray->weight * largest, .level = at->ray->level};
     if (next.level >= view->max_trace_level) {
         shader->rays.trace_level++;
         return true;
@@ -310,7 +312,10 @@ static bool follow_both(pl_shader *shader, const pl_spotted *at, pl_error *error
 
 static pl_ray ray_of(const pl_shader *shader, const pl_bounce *bounce)
 {
-    pl_ray ray = {.t_min = bounce->t_min, .t_max = shader->view->povray_epsilon ? POVRAY_FARTHEST : INFINITY};
+    pl_ray ray = {.t_min = bounce->t_min,
+                  .t_max = shader->view->povray_epsilon ? POVRAY_FARTHEST : INFINITY,
+                  .width = bounce->width,
+                  .spread = shader->view->spread};
     memcpy(ray.origin, bounce->origin, sizeof ray.origin);
     memcpy(ray.direction, bounce->direction, sizeof ray.direction);
     return ray;
@@ -322,6 +327,7 @@ static bool spot(const pl_bounce *bounce, const pl_ray *ray, double t, const pl_
 {
     at->ray = bounce;
     at->epsilon = pl_hit_epsilon(surface, ray, t);
+    at->width = ray->width + ray->spread * t;
     at->finish = pl_texture_finish(surface->texture);
     memcpy(at->point, surface->point, sizeof at->point);
     memcpy(at->normal, surface->normal, sizeof at->normal);

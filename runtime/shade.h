@@ -26,6 +26,7 @@ typedef struct pl_view {
     pl_camera camera;
     pl_light *lights;
     uint32_t light_count;
+    double spread; /* a pixel's width at unit distance; 0 until the picture's size is known */
     double ambient_light[3], background[3], max_trace_level, adc_bailout;
     bool all_opaque, povray_epsilon;
 } pl_view;

@@ -22,9 +22,15 @@ struct pl_block {
 
 typedef struct visit {
     uint32_t state, next_item;
-    size_t scopes, cursor;       /* where its entered symbols' packed scopes begin; the next one to be taken */
-    size_t trails, trail_counts; /* where its items' trails and their lengths begin */
+    uint32_t lowest;        /* the first open state that this one leads to (Tarjan 1972): states stand in visiting order */
+    size_t scopes, cursor;  /* where its entered symbols' packed scopes begin; the next one to be taken */
 } visit;
+
+/* A state whose component isn't finished. */
+typedef struct open_state {
+    uint32_t state;
+    size_t trails, trail_counts; /* where its items' trails and their lengths begin */
+} open_state;
 
 /* A growing array of fixed-size elements. */
 typedef struct array {
@@ -36,7 +42,7 @@ typedef struct builder {
     pl_states *states;
     pl_walk walk;
     pl_scope scope;
-    array items, chain, path, visits, scopes, trails, trail_counts, key;
+    array items, chain, path, visits, open, members, scopes, trails, trail_counts, key;
     pl_error *error;
 } builder;
 
@@ -105,26 +111,32 @@ void pl_states_free(pl_states *states)
     free(states->list);
     free(states->table);
     free(states->node_boxes);
+    free(states->coverage);
     memset(states, 0, sizeof *states);
 }
 
 /* --- the table --- */
+
+/* Word i of the key of a scope at a symbol node. */
+static uint64_t key_word(const pl_program *program, uint32_t symbol, const pl_scope *scope, uint32_t i)
+{
+    const pl_node *node = &program->nodes[symbol];
+    if (i == 0) return symbol;
+    if (i > node->as.symbol.live_count) return node->as.symbol.draws ? scope->key : 0;
+    double value = scope->parameters[program->slots[node->as.symbol.live_first + i - 1]];
+    return isnan(value) ? UINT64_MAX : pl_bits(value);
+}
 
 /* The key of the state that a scope leads to at a symbol node: symbol · live parameters · random key. */
 static bool make_key(builder *b, uint32_t symbol, const pl_scope *scope)
 {
     const pl_program *program = b->states->program;
     const pl_node *node = &program->nodes[symbol];
-    uint32_t live = node->as.symbol.live_count;
+    uint32_t words = node->as.symbol.live_count + 2;
     b->key.count = 0;
-    uint64_t *key = extend(&b->key, live + 2);
+    uint64_t *key = extend(&b->key, words);
     if (!key) return pl_fail_memory(b->error, "building the states");
-    key[0] = symbol;
-    for (uint32_t i = 0; i < live; i++) {
-        double value = scope->parameters[program->slots[node->as.symbol.live_first + i]];
-        key[1 + i] = isnan(value) ? UINT64_MAX : pl_bits(value);
-    }
-    key[1 + live] = node->as.symbol.draws ? scope->key : 0;
+    for (uint32_t i = 0; i < words; i++) key[i] = key_word(program, symbol, scope, i);
     return true;
 }
 
@@ -138,6 +150,21 @@ static uint64_t hash_key(const uint64_t *key, size_t words)
 static size_t key_words(const pl_states *states, uint32_t symbol)
 {
     return states->program->nodes[symbol].as.symbol.live_count + 2;
+}
+
+uint32_t pl_states_find(const pl_states *states, uint32_t symbol, const pl_scope *scope)
+{
+    size_t words = key_words(states, symbol);
+    uint64_t hash = 0;
+    for (uint32_t i = 0; i < words; i++) hash = pl_mix(hash, key_word(states->program, symbol, scope, i));
+    uint32_t mask = states->table_size - 1;
+    for (uint32_t slot = (uint32_t)hash & mask; states->table_size && states->table[slot]; slot = (slot + 1) & mask) {
+        const pl_state *state = &states->list[states->table[slot] - 1];
+        uint32_t i = 0;
+        while (state->symbol == symbol && i < words && state->key[i] == key_word(states->program, symbol, scope, i)) i++;
+        if (i == words) return states->table[slot] - 1;
+    }
+    return UINT32_MAX;
 }
 
 /* The slot of b->key in the table: taken by its state or free. */
@@ -184,7 +211,7 @@ static pl_state *add_state(builder *b, uint32_t symbol, const uint64_t *key)
         states->bytes += more;
     }
     pl_state *state = &states->list[states->count++];
-    *state = (pl_state){.symbol = symbol, .box = pl_box_empty(), .key = key, .on_path = true};
+    *state = (pl_state){.symbol = symbol, .box = pl_box_empty(), .key = key, .open = true};
     return state;
 }
 
@@ -193,7 +220,10 @@ static pl_state *add_state(builder *b, uint32_t symbol, const uint64_t *key)
 static bool remember_transform(builder *b)
 {
     const pl_transform *transform = b->walk.transform;
-    if (transform == &b->walk.computed && !(transform = keep(b, transform, sizeof *transform))) return false;
+    if (transform == &b->walk.computed) {
+        b->walk.computed.stretch = pl_largest_stretch(&transform->to_parent);
+        if (!(transform = keep(b, transform, sizeof *transform))) return false;
+    }
     b->chain.count = b->walk.at.marks[0]++;
     const pl_transform **place = extend(&b->chain, 1);
     if (!place) return pl_fail_memory(b->error, "building the states");
@@ -285,13 +315,16 @@ static bool begin_visit(builder *b, uint32_t symbol, const uint64_t *key)
                           "depth: %s is still being derived %d symbols deep, which is the limit; does its recursion end?",
                           b->states->program->strings[b->states->program->nodes[symbol].as.symbol.name].text,
                           PL_LIMIT_DEPTH);
-    visit v = {b->states->count, 0, b->scopes.count, b->scopes.count, b->trails.count, b->trail_counts.count};
+    visit v = {b->states->count, 0, b->states->count, b->scopes.count, b->scopes.count};
+    open_state open = {b->states->count, b->trails.count, b->trail_counts.count};
     if (!add_state(b, symbol, key) || !derive_items(b)) return false;
     pl_item *items = keep(b, b->items.data, b->items.count * sizeof *items);
     visit *place = extend(&b->visits, 1);
+    open_state *open_place = extend(&b->open, 1);
     if (!items) return false;
-    if (!place) return pl_fail_memory(b->error, "building the states");
+    if (!place || !open_place) return pl_fail_memory(b->error, "building the states");
     *place = v;
+    *open_place = open;
     pl_state *state = &b->states->list[v.state];
     state->items = items;
     state->item_count = (uint32_t)b->items.count;
@@ -321,34 +354,85 @@ static bool fail_endless(builder *b, uint32_t symbol, const uint64_t *key)
 
 /* --- boxes and counts, once an application's states are known --- */
 
-static void finish_state(builder *b, const visit *v)
+/* What a state consists of, its box aside; items in path order. */
+static void count_items(pl_states *states, pl_state *state)
 {
-    pl_states *states = b->states;
-    pl_state *state = &states->list[v->state];
-    const pl_trail_node *trail = (const pl_trail_node *)b->trails.data + v->trails;
-    const uint32_t *trail_counts = (const uint32_t *)b->trail_counts.data + v->trail_counts;
+    uint64_t count = 0;
     for (uint32_t i = 0; i < state->item_count; i++) {
         pl_item *item = (pl_item *)&state->items[i];
+        item->first = count;
+        count = pl_add_saturating(count, pl_item_primitives(states, item));
+        if (item->kind != PL_NODE_ENTER) continue;
+        const pl_state *below = &states->list[item->what];
+        if (!below->open) state->singular = pl_add_saturating(state->singular, below->singular);
+        if (below->depth > state->depth) state->depth = below->depth;
+        state->endless = state->endless || below->endless;
+    }
+    state->primitives = count;
+    if (state->depth < UINT32_MAX) state->depth += state->symbol != UINT32_MAX;
+}
+
+/* The boxes of what a state's items hold. One in a cycle has its own box and gate already; graph nodes need no boxes where
+ * there are gates. */
+static void bound_items(builder *b, const open_state *open, bool in_cycle)
+{
+    pl_states *states = b->states;
+    pl_state *state = &states->list[open->state];
+    const pl_trail_node *trail = (const pl_trail_node *)b->trails.data + open->trails;
+    const uint32_t *trail_counts = (const uint32_t *)b->trail_counts.data + open->trail_counts;
+    for (uint32_t i = 0; i < state->item_count; i++) {
+        const pl_item *item = &state->items[i];
         pl_reach reach;
-        pl_box box = pl_item_box(states, item, &reach);
-        item->first = state->primitives;
-        state->primitives = pl_add_saturating(state->primitives, pl_item_primitives(states, item));
+        pl_box box = pl_item_box_tight(states, item, &reach);
         if (pl_item_unbounded(states, item) || !(pl_box_is_empty(&box) || pl_box_is_finite(&box)))
             state->unbounded = true;
-        pl_box_join(&state->box, &box);
+        if (!in_cycle) pl_box_join(&state->box, &box);
         pl_reach_join(&state->reach, &reach);
-        if (item->kind == PL_NODE_ENTER) {
-            const pl_state *below = &states->list[item->what];
-            state->singular = pl_add_saturating(state->singular, below->singular);
-            if (below->depth > state->depth) state->depth = below->depth;
-        }
-        if (states->node_boxes) pl_join_node_boxes(states, item, trail, trail_counts[i]);
+        if (states->node_boxes && !state->endless) pl_join_node_boxes(states, item, trail, trail_counts[i]);
         trail += trail_counts[i];
     }
-    state->depth += state->symbol != UINT32_MAX;
     state->reach.size = fmin(state->reach.size, 1.7320508075688774 * pl_box_reach(&state->box));
-    state->on_path = false;
-    if (states->node_boxes && state->symbol != UINT32_MAX) pl_join_symbol_box(states, v->state);
+    if (!in_cycle) state->gate = state->reach;
+    else pl_reach_join(&state->reach, &state->gate);
+}
+
+/* Finishes the open states from `first` on, which lead to each other: all that they enter otherwise is finished. */
+static bool finish_component(builder *b, size_t first)
+{
+    pl_states *states = b->states;
+    const open_state *open = (const open_state *)b->open.data + first;
+    size_t count = b->open.count - first;
+    bool cyclic = states->list[open->state].endless;
+    if (cyclic) {
+        b->members.count = 0;
+        uint32_t *members = extend(&b->members, count);
+        if (!members) return pl_fail_memory(b->error, "building the states");
+        for (size_t i = 0; i < count; i++) {
+            pl_state *state = &states->list[members[i] = open[i].state];
+            state->endless = true;
+            state->depth = UINT32_MAX;
+            state->primitives = UINT64_MAX;
+        }
+        int bound = pl_bound_component(states, members, (uint32_t)count, b->error);
+        if (bound < 0) return false;
+        if (!bound) return fail_endless(b, states->list[*members].symbol, states->list[*members].key);
+    }
+    for (size_t i = 0; i < count; i++) {
+        pl_state *state = &states->list[open[i].state];
+        count_items(states, state);
+        if (cyclic) state->primitives = UINT64_MAX, state->depth = UINT32_MAX;
+        bound_items(b, &open[i], cyclic);
+        if (states->node_boxes && state->symbol != UINT32_MAX && !state->endless) pl_join_symbol_box(states, open[i].state);
+        double square = 0.0;
+        for (int axis = 0; axis < 3 && !pl_box_is_empty(&state->box); axis++)
+            square += (state->box.hi[axis] - state->box.lo[axis]) * (state->box.hi[axis] - state->box.lo[axis]);
+        state->diameter = sqrt(square);
+    }
+    for (size_t i = 0; i < count; i++) states->list[open[i].state].open = false;
+    b->trails.count = open->trails;
+    b->trail_counts.count = open->trail_counts;
+    b->open.count = first;
+    return true;
 }
 
 /* --- exploring --- */
@@ -367,7 +451,10 @@ static bool resolve_item(builder *b, visit *v)
     uint32_t slot = find_slot(states, b->key.data);
     if (states->table[slot]) {
         item->what = states->table[slot] - 1;
-        return !states->list[item->what].on_path || fail_endless(b, symbol, b->key.data);
+        if (!states->list[item->what].open) return true;
+        states->list[item->what].endless = true;
+        if (item->what < v->lowest) v->lowest = item->what;
+        return true;
     }
     uint64_t *key = keep(b, b->key.data, b->key.count * sizeof *key);
     if (!key) return false;
@@ -387,11 +474,14 @@ static bool explore(builder *b)
             if (!resolve_item(b, v)) return false;
             continue;
         }
-        finish_state(b, v);
-        b->scopes.count = v->scopes;
-        b->trails.count = v->trails;
-        b->trail_counts.count = v->trail_counts;
+        visit done = *v;
+        b->scopes.count = done.scopes;
         b->visits.count--;
+        if (b->visits.count && done.lowest < v[-1].lowest) v[-1].lowest = done.lowest;
+        if (done.lowest < done.state) continue;
+        size_t first = b->open.count - 1;
+        while (((const open_state *)b->open.data)[first].state != done.state) first--;
+        if (!finish_component(b, first)) return false;
     }
     return true;
 }
@@ -408,6 +498,8 @@ bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree 
     b.chain.element = sizeof(pl_transform *);
     b.path.element = b.trails.element = sizeof(pl_trail_node);
     b.visits.element = sizeof(visit);
+    b.open.element = sizeof(open_state);
+    b.members.element = sizeof(uint32_t);
     b.scopes.element = b.key.element = sizeof(uint64_t);
     b.trail_counts.element = sizeof(uint32_t);
     bool ok = pl_walk_begin(&b.walk, program, 0, NULL, error);
@@ -424,7 +516,7 @@ bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree 
     ok = ok && explore(&b);
     pl_walk_end(&b.walk);
     free(b.scope.parameters);
-    array *arrays[] = {&b.items, &b.chain, &b.path, &b.visits, &b.scopes, &b.trails, &b.trail_counts, &b.key};
+    array *arrays[] = {&b.items, &b.chain, &b.path, &b.visits, &b.open, &b.members, &b.scopes, &b.trails, &b.trail_counts, &b.key};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]->data);
     if (!ok) pl_states_free(states);
     return ok;

@@ -10,7 +10,8 @@
  *     pl_states_free(&states);
  *
  * Fig 2.1's tree has 2,049 cylinders and 13 states. Boxes are exact bottom-up unions in each state's own frame; counts
- * saturate at UINT64_MAX. A state that is reached again on its own path never ends and is an error. */
+ * saturate at UINT64_MAX. States that contain themselves are legal where every way round contracts: their boxes hold
+ * the whole limit set (endless.c), and a cut-off ends them (cut.h). Otherwise they are an error. */
 #ifndef PL_STATE_H
 #define PL_STATE_H
 
@@ -45,10 +46,13 @@ typedef struct pl_state {
     uint32_t item_count;
     const pl_item *items;
     pl_box box;      /* of the bounded primitives, in this state's frame */
-    pl_reach reach;
+    double diameter; /* of the box */
+    pl_reach reach;  /* by which the boxes of its items must be widened */
+    pl_reach gate;   /* by which its own box must be; differs from reach only in endless states */
     bool unbounded;  /* has unbounded primitives below */
-    bool on_path;    /* while building: being explored now */
-    uint32_t depth;  /* most symbols entered below, itself included */
+    bool endless;    /* contains itself, or a state that does */
+    bool open;       /* while building: its component isn't finished */
+    uint32_t depth;  /* most symbols entered below, itself included; UINT32_MAX: endless */
     uint64_t primitives, singular;
     const uint64_t *key;
 } pl_state;
@@ -68,6 +72,8 @@ typedef struct pl_states {
     uint32_t *table; /* open addressing: state + 1; 0: free */
     uint32_t table_size;
     pl_node_box *node_boxes; /* per graph node; NULL unless asked for */
+    bool cuts;               /* a detail cut-off applies: every instance is passed through its gate (cut.h) */
+    float *coverage;         /* of each state by direction, with cuts (coverage.c) */
     struct pl_block *blocks; /* memory of items, transformations, terms and keys */
     size_t bytes, limit;
 } pl_states;
@@ -78,10 +84,20 @@ bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree 
                      size_t limit, pl_error *error);
 void pl_states_free(pl_states *states);
 
-/* The primitive index, in derivation order, of the leaf at a path; UINT64_MAX if the path doesn't exist. */
-uint64_t pl_states_locate(const pl_states *states, const pl_path *path);
+/* The primitive index, in derivation order, of the leaf at a path; UINT64_MAX if the path doesn't exist. depth: 0, or
+ * the number of symbols entered where the path ends at an instance of a state: then its first primitive's. */
+uint64_t pl_states_locate(const pl_states *states, const pl_path *path, uint32_t depth);
 
-/* The box and reach of an item in its state's frame. */
+/* The state that a scope leads to at a symbol node; UINT32_MAX if there is none. */
+uint32_t pl_states_find(const pl_states *states, uint32_t symbol, const pl_scope *scope);
+
+/* Boxes and gates of states that enter each other for ever (endless.c). 1: done; 0: not every way round contracts; -1: an
+ * error. */
+int pl_bound_component(pl_states *states, const uint32_t *members, uint32_t count, pl_error *error);
+
+/* The box and reach of an item in its state's frame. The tight one bounds primitives; with cuts, the other also holds the
+ * whole box of the item's state, which may be drawn. */
+pl_box pl_item_box_tight(const pl_states *states, const pl_item *item, pl_reach *reach);
 pl_box pl_item_box(const pl_states *states, const pl_item *item, pl_reach *reach);
 /* Of an item in its own frame, below its transformations. */
 pl_reach pl_item_reach(const pl_states *states, const pl_item *item);

@@ -10,6 +10,9 @@
 #include "accel/accel.h"
 #include "error.h"
 
+/* How far below a cut instance its first primitive is looked for. */
+enum { CUT_DEPTH = 64, CUT_STEPS = 4096 };
+
 /* A point and direction in the frame at hand, and what finishing needs of the leaf. */
 typedef struct leaf_surface {
     const double *o, *d;
@@ -94,6 +97,52 @@ static void begin_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hi
         surface->pattern_point[axis] = ray->origin[axis] + hit->t * ray->direction[axis];
 }
 
+/* The texture of the first primitive below a cut instance, where there is one within reach: an endless recursion may have
+ * none at all. The walk stands at the instance. */
+static bool take_first_texture(pl_tracer *tracer, double t, pl_surface *surface, pl_error *error)
+{
+    pl_walk *walk = &tracer->walk;
+    const double *texture = surface->texture;
+    const uint32_t entries = surface->entries, deepest = walk->at.depth + CUT_DEPTH;
+    double point[3], *o = walk->at.payload;
+    memcpy(point, surface->pattern_point, sizeof point);
+    walk->follow = NULL;
+    for (int steps = 0; steps < CUT_STEPS && walk->at.depth < deepest; steps++) {
+        switch (pl_walk_next(walk, error)) {
+        case PL_EVENT_ERROR: return false;
+        case PL_EVENT_PRIMITIVE:
+        case PL_EVENT_MESH: return true;
+        case PL_EVENT_TRANSFORM: pl_map_ray(walk->transform, o, o + 3); break;
+        case PL_EVENT_TEXTURE:
+            if (!take_texture(tracer, t, surface, error)) return false;
+            break;
+        case PL_EVENT_END: steps = CUT_STEPS; break;
+        default: break;
+        }
+    }
+    surface->texture = texture;
+    surface->entries = entries;
+    memcpy(surface->pattern_point, point, sizeof point);
+    return true;
+}
+
+/* A cut instance: its box has no sides, so the normal is turned against the ray. The walk stands at its enter node. */
+static bool finish_cut(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface, pl_error *error)
+{
+    const pl_program *program = tracer->scene->program;
+    const uint32_t symbol = program->nodes[tracer->walk.node].as.enter.symbol;
+    double length = 0.0;
+    for (int axis = 0; axis < 3; axis++) length += ray->direction[axis] * ray->direction[axis];
+    for (int axis = 0; axis < 3; axis++) {
+        surface->normal[axis] = -ray->direction[axis] / sqrt(length);
+        surface->point[axis] = ray->origin[axis] + hit->t * ray->direction[axis];
+    }
+    surface->symbol = (int32_t)program->nodes[symbol].symbol;
+    surface->rule = tracer->walk.at.rule;
+    surface->depth = (int32_t)hit->cut_depth;
+    return take_first_texture(tracer, hit->t, surface, error);
+}
+
 /* By the path: the derivation once more. */
 static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, const pl_path *path,
                          pl_surface *surface, pl_error *error)
@@ -116,6 +165,10 @@ static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit
             break;
         case PL_EVENT_TEXTURE:
             if (!take_texture(tracer, hit->t, surface, error)) return false;
+            break;
+        case PL_EVENT_ENTER:
+            if (hit->cut_depth && walk->at.terms == path->length && walk->at.depth + 1 == hit->cut_depth)
+                return finish_cut(tracer, ray, hit, surface, error);
             break;
         case PL_EVENT_PRIMITIVE:
             leaf.shape = pl_shape_of(walk->shape);

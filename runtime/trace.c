@@ -63,7 +63,12 @@ void pl_hit_free(pl_hit *hit)
 
 static pl_query begin_query(pl_tracer *tracer, const pl_ray *ray, pl_query_kind kind, pl_error *error)
 {
+    const double *d = ray->direction, px = tracer->scene->detail;
+    const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     return (pl_query){.kind = kind,
+                      .footprint = {px * ray->width, px * ray->spread, px * ray->width / length},
+                      .length = length,
+                      .ray = tracer->scene->states.cuts ? pl_cut_ray(ray->origin, ray->direction) : 0,
                       .t_min = ray->t_min,
                       .t_max = ray->t_max,
                       .shadow = ray->shadow,
@@ -78,7 +83,8 @@ static pl_query begin_query(pl_tracer *tracer, const pl_ray *ray, pl_query_kind 
 /* Accelerators that skip without counting leave the primitive's index to be found from the path. */
 static void number_primitive(const pl_tracer *tracer, pl_hit *hit)
 {
-    if (tracer->scene->accel->node_boxes) hit->primitive = pl_states_locate(&tracer->scene->states, &hit->path);
+    if (tracer->scene->accel->node_boxes || tracer->scene->states.cuts)
+        hit->primitive = pl_states_locate(&tracer->scene->states, &hit->path, hit->cut_depth);
 }
 
 bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_error *error)
@@ -87,11 +93,16 @@ bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_erro
     query.hit = hit;
     hit->t = INFINITY;
     hit->bound = NAN;
+    hit->cut_depth = 0;
     if (!tracer->scene->accel->trace(tracer, ray, &query)) {
         hit->t = INFINITY;
         return false;
     }
     if (query.found) number_primitive(tracer, hit);
+    if (query.found && hit->cut_depth) {
+        tracer->counters.cuts++;
+        tracer->counters.cut_error = fmax(tracer->counters.cut_error, hit->bound * query.length);
+    }
     return true;
 }
 

@@ -16,6 +16,7 @@ typedef struct pl_ray {
     double origin[3], direction[3];
     double t_min, t_max; /* hits at t_min < t < t_max count */
     bool shadow;         /* skip what stands below no_shadow */
+    double width, spread; /* a pixel's width at t, in scene units: width + spread * t; 0: all is as near as can be */
 } pl_ray;
 
 /* A point on a derivation path: union term indices from the root, owned by the hit (grown as needed). */
@@ -27,6 +28,7 @@ typedef struct pl_path {
 typedef struct pl_hit {
     double t;           /* INFINITY: none */
     double bound;       /* error bound of t; NaN until known */
+    uint32_t cut_depth; /* 0: a primitive; else symbols entered to the instance drawn as its state's box (cut.h) */
     uint64_t primitive; /* index in derivation order */
     int32_t part;       /* of the shape: a face, or a mesh's triangle */
     pl_path path;       /* where the accelerator has no trail */
@@ -71,6 +73,8 @@ double pl_hit_epsilon(const pl_surface *surface, const pl_ray *ray, double t);
 typedef struct pl_counters {
     uint64_t box_tests, primitive_tests; /* primitive_tests: in double */
     uint64_t filtered, instances;        /* primitives tried in single precision; instances entered */
+    uint64_t cuts;       /* foremost hits that are boxes of cut instances */
+    double cut_error;    /* largest error bound of theirs, in scene units */
     uint32_t miss_depth; /* deepest recursion depth at which a box was missed, since last reset */
 } pl_counters;
 pl_counters *pl_tracer_counters(pl_tracer *tracer);

@@ -45,6 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--povray-epsilon", action="store_true", help="POV-Ray's hit and shadow tolerances (as `compare` does)"
     )
+    parser.add_argument(
+        "--detail", type=pixels, metavar="PX", help="draw what is smaller than PX pixels as a box (0: nothing; default: 0, but 0.5 where a recursion has no end)"
+    )
     parser.add_argument("--explain", action="store_true", help="say what was left out because the scene doesn't need it")
 
 
@@ -73,6 +76,16 @@ def voxels(text: str) -> tuple[int, int, int]:
     if len(sides) != 3 or not all(side.isdecimal() and 1 <= int(side) <= 4096 for side in sides):
         raise argparse.ArgumentTypeError(f"'{text}' isn't NxMxK, such as 16x16x8")
     return tuple(int(side) for side in sides)
+
+
+def pixels(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"'{text}' isn't a number of pixels, 0 or more")
+    return value
 
 
 def aov_names(text: str) -> tuple[str, ...]:
@@ -105,6 +118,7 @@ def run(arguments: argparse.Namespace) -> int:
         threads=arguments.threads or None,
         povray_epsilon=arguments.povray_epsilon,
         grid=arguments.grid,
+        detail=arguments.detail,
     ) as scene:
         image = _render(scene, arguments)
         statistics = scene.statistics
@@ -217,6 +231,8 @@ def _facts(arguments: argparse.Namespace, statistics: dict, seconds: dict, left_
         "povray_epsilon": arguments.povray_epsilon,
         "primitives": json_integer(statistics["primitives"]),
         "states": statistics["states"],
+        "detail": statistics["detail"],
+        "cut": statistics["cut"],
         "rays": statistics["rays"],
         "seconds": {name: round(value, 6) for name, value in seconds.items()},
         "memory": {

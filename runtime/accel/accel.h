@@ -10,6 +10,7 @@
 #ifndef PL_ACCEL_H
 #define PL_ACCEL_H
 
+#include "../cut.h"
 #include "../scene.h"
 
 /* Steps that one ray may take: entries of bvh's stack; nodes of a walk. Far beyond any ray that makes sense, it ends
@@ -25,6 +26,9 @@ struct pl_hit_list;
 typedef struct pl_query {
     pl_query_kind kind;
     double t_min, t_max; /* open interval; t_max shrinks to just beyond the best hit */
+    pl_footprint footprint; /* for the gates of instances */
+    double length;          /* of the ray's direction in the world */
+    uint64_t ray;           /* its key (pl_cut_ray), with cut-offs */
     bool shadow;         /* skip what stands below no_shadow */
     bool found, done;    /* done: no more leaves are wanted */
     pl_hit *hit;         /* nearest: the best so far */
@@ -48,10 +52,33 @@ typedef struct pl_leaf {
     bool (*path)(const void *source, pl_path *path); /* NULL: there is a trail */
     bool (*trail)(const void *source, pl_path *trail);
     const void *source;
+    uint32_t cut_depth; /* 0, but for a cut instance (pl_query_cut) */
+    double bound;
 } pl_leaf;
 
 /* Offers a leaf; o, d: the ray in its frame. false: an error. */
 bool pl_query_leaf(pl_query *query, const pl_leaf *leaf, const double o[3], const double d[3]);
+
+/* An instance that a ray comes to in a scene with cut-offs. */
+typedef struct pl_arrival {
+    uint32_t state;
+    const double *o, *d;
+    double stretch;
+    uint32_t depth; /* symbols entered, the state's own included */
+} pl_arrival;
+
+/* Whether the instance is to be gone into. Where it is cut, the box is offered at t_entry by pl_query_cut; the path's hash
+ * (pl_cut_hash of all its terms) is wanted only then. */
+static inline pl_gate pl_query_gate(const pl_query *query, const pl_states *states, const pl_arrival *at,
+                                    double *t_entry)
+{
+    return pl_gate_of(states, at->state, at->o, at->d, at->stretch, &query->footprint, query->t_min, query->t_max,
+                      t_entry);
+}
+
+/* Offers a cut instance's box; leaf: path, source and primitive. false: an error. */
+bool pl_query_cut(pl_query *query, const pl_states *states, const pl_arrival *at, uint64_t hash, double t_entry,
+                  const pl_leaf *leaf);
 
 struct pl_accel {
     const char *name;
@@ -70,7 +97,7 @@ struct pl_accel {
 /* The union terms of items, one after another. false: no memory. */
 bool pl_items_path(const pl_items *items, pl_path *path);
 
-extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh, pl_accel_grid;
+extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh, pl_accel_gated, pl_accel_grid;
 
 /* One step of the normative chain. */
 static inline void pl_map_ray(const pl_transform *transform, double o[3], double d[3])

@@ -28,8 +28,11 @@ void *pl_walk_announcing_create(const pl_scene *scene, pl_error *error)
     return walk;
 }
 
+/* With cut-offs the boxes of instances, tested at their gates, take the place of the nodes'. */
 static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
 {
+    pl_walk *walk = tracer->work;
+    walk->announce = !tracer->scene->states.cuts;
     return pl_walk_trace(tracer->work, tracer->scene, &tracer->counters, ray, query, pl_walk_misses_box);
 }
 

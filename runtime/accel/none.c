@@ -12,10 +12,42 @@ static bool walk_path(const void *source, pl_path *path)
     return pl_path_copy(path, &walk->path, walk->at.terms);
 }
 
+/* Where the payload has the product of stretches, behind the ray. */
+enum { STRETCH = 6 };
+
+/* At an enter node: goes on only into instances whose gate is open. */
+static bool pass_gate(pl_walk *walk, const pl_scene *scene, pl_counters *counters, pl_query *query)
+{
+    const pl_states *states = &scene->states;
+    const uint32_t symbol = scene->program->nodes[walk->node].as.enter.symbol;
+    pl_arrival at = {.state = pl_states_find(states, symbol, &walk->scope),
+                     .o = walk->at.payload,
+                     .d = walk->at.payload + 3,
+                     .stretch = walk->at.payload[STRETCH],
+                     .depth = walk->at.depth + 1};
+    double t_entry;
+    if (query->shadow && walk->at.no_shadow) {
+        pl_walk_prune(walk);
+        return true;
+    }
+    counters->box_tests++;
+    pl_gate gate = pl_query_gate(query, states, &at, &t_entry);
+    if (gate == PL_GATE_OPEN) return true;
+    pl_walk_prune(walk);
+    if (gate == PL_GATE_MISSED) {
+        if (walk->at.depth > counters->miss_depth) counters->miss_depth = walk->at.depth;
+        return true;
+    }
+    pl_leaf leaf = {.path = walk_path, .source = walk};
+    return pl_query_cut(query, states, &at, pl_cut_hash(0, walk->path.terms, walk->at.terms), t_entry, &leaf);
+}
+
 bool pl_walk_offer(pl_walk *walk, const pl_scene *scene, pl_counters *counters, pl_query *query, pl_node_test missed)
 {
+    const bool cuts = scene->states.cuts;
     uint64_t primitive = 0, steps = 0;
     double *o = walk->at.payload, *d = o + 3;
+    walk->stretches = cuts;
     while (!query->done) {
         pl_leaf leaf = {.path = walk_path, .source = walk};
         if (++steps > PL_LIMIT_WALK_STEPS) return pl_query_fail_steps(query, PL_LIMIT_WALK_STEPS);
@@ -25,9 +57,14 @@ bool pl_walk_offer(pl_walk *walk, const pl_scene *scene, pl_counters *counters, 
         case PL_EVENT_NODE:
             if (missed(walk, scene, counters, query)) pl_walk_prune(walk);
             continue;
-        case PL_EVENT_TRANSFORM: pl_map_ray(walk->transform, o, d); continue;
-        case PL_EVENT_TEXTURE:
-        case PL_EVENT_ENTER: continue;
+        case PL_EVENT_TRANSFORM:
+            pl_map_ray(walk->transform, o, d);
+            walk->at.payload[STRETCH] *= walk->transform->stretch;
+            continue;
+        case PL_EVENT_TEXTURE: continue;
+        case PL_EVENT_ENTER:
+            if (cuts && !pass_gate(walk, scene, counters, query)) return false;
+            continue;
         case PL_EVENT_PRIMITIVE:
             leaf.shape = walk->shape;
             leaf.arguments = walk->arguments;
@@ -48,6 +85,7 @@ bool pl_walk_trace(pl_walk *walk, const pl_scene *scene, pl_counters *counters, 
     pl_walk_restart(walk, 0, NULL);
     memcpy(walk->at.payload, ray->origin, 3 * sizeof(double));
     memcpy(walk->at.payload + 3, ray->direction, 3 * sizeof(double));
+    walk->at.payload[STRETCH] = 1.0;
     return pl_walk_offer(walk, scene, counters, query, missed);
 }
 

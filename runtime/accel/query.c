@@ -44,6 +44,15 @@ static int comes_before(pl_query *query, const pl_leaf *leaf)
     return pl_path_compare(query->scratch, &hit->path) < 0;
 }
 
+static void set_hit(pl_hit *hit, const pl_leaf *leaf, const pl_root *root)
+{
+    hit->t = root->t;
+    hit->primitive = leaf->primitive;
+    hit->part = root->part;
+    hit->cut_depth = leaf->cut_depth;
+    hit->bound = leaf->cut_depth ? leaf->bound : NAN;
+}
+
 static bool keep_nearest(pl_query *query, const pl_leaf *leaf, const pl_root *root)
 {
     pl_hit *hit = query->hit;
@@ -54,9 +63,7 @@ static bool keep_nearest(pl_query *query, const pl_leaf *leaf, const pl_root *ro
     }
     if (!(leaf->trail ? leaf->trail(leaf->source, &hit->trail) : leaf->path(leaf->source, &hit->path)))
         return pl_fail_memory(query->error, "tracing a ray");
-    hit->t = root->t;
-    hit->primitive = leaf->primitive;
-    hit->part = root->part;
+    set_hit(hit, leaf, root);
     /* Just beyond, so that others at the same t are still compared; never beyond what was asked for. */
     double beyond = nextafter(root->t, INFINITY);
     if (beyond < query->t_max) query->t_max = beyond;
@@ -76,9 +83,7 @@ static bool keep_listed(pl_query *query, const pl_leaf *leaf, const pl_root *roo
     }
     pl_hit *hit = &list->hits[list->count];
     if (!leaf_path(query, leaf, &hit->trail, &hit->path)) return pl_fail_memory(query->error, "tracing a ray");
-    hit->t = root->t;
-    hit->primitive = leaf->primitive;
-    hit->part = root->part;
+    set_hit(hit, leaf, root);
     list->count++;
     return true;
 }
@@ -122,6 +127,17 @@ bool pl_query_leaf(pl_query *query, const pl_leaf *leaf, const double o[3], cons
     for (int i = 0; i < count; i++)
         if (!keep(query, leaf, &roots[i])) return false;
     return true;
+}
+
+bool pl_query_cut(pl_query *query, const pl_states *states, const pl_arrival *at, uint64_t hash, double t_entry,
+                  const pl_leaf *leaf)
+{
+    if (!(t_entry < query->t_max) || !pl_cut_is_drawn(states, at->state, at->d, hash, at->depth, query->ray))
+        return true;
+    pl_leaf cut = *leaf;
+    cut.cut_depth = at->depth;
+    cut.bound = states->list[at->state].diameter * at->stretch / query->length;
+    return keep(query, &cut, &(pl_root){t_entry, 0});
 }
 
 /* (t, path), then the root's order on its leaf. */

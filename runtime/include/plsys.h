@@ -53,6 +53,8 @@ typedef struct pl_options {
     uint32_t grid[3];    /* of PL_GRID: voxels along x, y and z; all 0: 16, 16 and 8 */
     int isa;             /* pl_isa: the instruction set of bvh's kernel; same hits from each */
     uint64_t front_items; /* bvh: items a front may have, UINT64_MAX: all; 0: chosen by `memory` */
+    double detail;       /* pixel footprints below which an instance is drawn as its state's box; 0: automatic (none, but
+                            0.5 in endless scenes); below 0: none, endless scenes end where rounding does */
 } pl_options;
 
 typedef struct pl_scene pl_scene;
@@ -116,7 +118,7 @@ PL_API bool pl_render(pl_scene *scene, const pl_render_options *options, const p
 typedef struct pl_statistics {
     uint64_t primitives; /* that symbols generate (the scene's own objects don't count); UINT64_MAX: more, or unknown */
     uint64_t states;
-    uint64_t depth;        /* most symbols entered on a path */
+    uint64_t depth;        /* most symbols entered on a path, UINT64_MAX: endless or unknown */
     uint64_t scene_bytes;  /* program, states and accelerator */
     uint64_t rays_primary, rays_shadow, rays_reflection, rays_transmitted;
     uint64_t box_tests, primitive_tests;
@@ -124,6 +126,9 @@ typedef struct pl_statistics {
     uint64_t bailout, trace_level; /* rays ended by adc_bailout and by max_trace_level */
     double seconds_verify, seconds_build, seconds_trace;
     int accelerator, threads;
+    double detail;          /* the cut-off in use, in pixel footprints; 0: none */
+    uint64_t cut_instances; /* rays whose foremost hit is a cut instance's box */
+    double cut_max_error;   /* the largest error bound of these, in scene units */
 } pl_statistics;
 
 PL_API void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics);

@@ -26,7 +26,7 @@ EVERYTHING = tuple(
 LOWER = tuple(
     f"{name}.c"
     for name in (
-        *("error", "reader", "load", "load_nodes", "load_records", "table", "verify"),
+        *("error", "reach", "reader", "load", "load_nodes", "load_records", "table", "verify"),
         *("expression", "elementary", "dump"),
     )
 )

@@ -1,0 +1,62 @@
+/* cut.h - where a picture stops: instances too small to be seen are drawn as the boxes of their states (--detail).
+ *
+ * In a scene with a cut-off (states->cuts) every instance of a state is passed through its *gate*, and the gates are part of
+ * the normative hit: an accelerator that comes to an instance, with the ray mapped there step by step, asks
+ *
+ *     switch (pl_gate_of(states, state, o, d, stretch, &query->footprint, query->t_min, query->t_max, &t_entry)) {
+ *     case PL_GATE_MISSED: leave the instance out
+ *     case PL_GATE_OPEN:   go on with its items
+ *     case PL_GATE_CUT:    pl_query_cut(…), which draws it or leaves it out
+ *     }
+ *
+ * and otherwise may filter as it likes as long as it doesn't leave out an instance that would pass all gates on its path.
+ * So a hit with cut-offs depends on the path alone, and boxes of items must hold the whole boxes of their states
+ * (pl_item_box). What is open at a gate is decided in double from the mapped ray, the state's own box and the product
+ * of the stretches of the transformations on the path, outermost first, starting from 1.
+ *
+ * An instance is cut when diameter · stretch <= PX · footprint(t at the box's entry): then no point of it is farther than
+ * that from the box's entry. The footprint is a pixel's width at that distance. In endless states an instance
+ * is cut as well where its diameter falls to what rounding blurs: below, nothing could be told apart.
+ *
+ * What is cut keeps its coverage: the share of the box's silhouette that the state itself covers, by direction
+ * (coverage.c). The box is drawn with that probability, decided by a hash of the path and the ray (stochastic transparency:
+ * Enderton, Sintorn, Shirley & Luebke 2010), so that means over rays are right: one sample a pixel is no noisier than
+ * one sample of the geometry itself, and antialiasing converges. Deciding once an instance (Cook, Halstead, Planck & Ryu 2007)
+ * makes a small object appear whole or not at all; a blend would need all boxes on the ray in order instead of the nearest. */
+#ifndef PL_CUT_H
+#define PL_CUT_H
+
+#include "state.h"
+
+/* Directions, up to sign, that coverages are kept for: axes, diagonals of faces, diagonals of the box. */
+enum { PL_COVERAGE_DIRECTIONS = 13 };
+
+/* PX footprints, in scene units, at t are width + spread · t; entries at t <= skip lie within the ray's first footprint. */
+typedef struct pl_footprint {
+    double width, spread, skip;
+} pl_footprint;
+
+typedef enum pl_gate { PL_GATE_MISSED, PL_GATE_OPEN, PL_GATE_CUT } pl_gate;
+
+/* stretch: the product of the stretches on the path. t_max only saves work. */
+pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], const double d[3], double stretch,
+                   const pl_footprint *footprint, double t_min, double t_max, double *t_entry);
+
+/* The path's hash so far and more terms of it; 0 at the root. */
+uint64_t pl_cut_hash(uint64_t hash, const uint32_t *terms, uint32_t count);
+
+/* A ray's key: a pure function of its origin and direction in the world. */
+uint64_t pl_cut_ray(const double origin[3], const double direction[3]);
+
+/* Whether the cut instance is drawn for a ray, with direction d in its frame: a pure function of path and ray. hash: of the
+ * path's terms; depth: symbols entered on it, the state's own included; ray: pl_cut_ray. */
+bool pl_cut_is_drawn(const pl_states *states, uint32_t state, const double d[3], uint64_t hash, uint32_t depth,
+                     uint64_t ray);
+
+/* Finds the coverages of all states; sets states->coverage. */
+bool pl_coverage_build(pl_states *states, pl_error *error);
+
+/* The share of a state's silhouette that is covered from a direction of its frame. */
+double pl_coverage_of(const pl_states *states, uint32_t state, const double d[3]);
+
+#endif
