@@ -11,8 +11,8 @@ Example: ``Selection A { A -> box + [ trans 0 0 1 ] A; }`` is an error; with ``[
 from __future__ import annotations
 
 from . import affine
-from .evaluate import NotFinite, fold
-from .model import Constant, Enter, Step, Symbol, Transform
+from .check_scaling import linear_map
+from .model import Enter, Symbol
 from .walk import Way, decided, is_open, ways
 
 MOST_CYCLES = 1000
@@ -33,7 +33,7 @@ def stays_large(members: list[Symbol], seed: float) -> bool:
             matrix = _linear(way, seed)
             if matrix is not None and all(decided(test, seed) is not None for test, _ in way.guards):
                 leaving[names[symbol.name]].add((names[way.leaf.symbol], matrix))
-    return any(_radius(matrix) >= CONTRACTING for matrix in _cycles(leaving))
+    return any(affine.spectral_radius(matrix) >= CONTRACTING for matrix in _cycles(leaving))
 
 
 def _cycles(leaving: list[set[tuple[int, Linear]]]) -> list[Linear]:
@@ -59,20 +59,5 @@ def _cycles(leaving: list[set[tuple[int, Linear]]]) -> list[Linear]:
 
 def _linear(way: Way, seed: float) -> Linear | None:
     """The way's transformations without their translations; None where they aren't constant."""
-    matrix = affine.IDENTITY
-    for operator in way.operators:
-        for step in operator.steps if isinstance(operator, Transform) else ():
-            try:
-                values = tuple(fold(argument, seed) for argument in step.arguments)
-            except NotFinite:
-                return None
-            if not all(isinstance(value, Constant) for value in values):
-                return None
-            if step.operation == "rot" and not any(value.value for value in values[1:]):
-                return None
-            matrix = affine.compose(matrix, affine.of_step(Step(step.operation, values)))
-    return tuple(0.0 if i % 4 == 3 else value for i, value in enumerate(matrix))
-
-
-def _radius(matrix: Linear) -> float:
-    return affine.spectral_radius(matrix)
+    matrix = linear_map(way.operators, seed)
+    return matrix and tuple(0.0 if i % 4 == 3 else value for i, value in enumerate(matrix))

@@ -1,7 +1,7 @@
 """Recursions that can't end, or end by luck only.
 
 On the graph of symbols (guards ignored unless they are decided): a symbol *ends* if one of its ways leads only to
-symbols that end. What doesn't end is an error. Of what may end, cycles are looked at whose guards read nothing
+symbols that end. What doesn't end is an error unless every way round contracts. Of what may end, cycles are looked at whose guards read nothing
 that changes on the way round, and cycles that only a draw leaves.
 
 Example: ``Selection A { A -> box + [ trans 0 0 1 ] A; }`` never ends; with ``if (n > 0)`` and no ``--n``, it ends
@@ -11,6 +11,7 @@ at once or never.
 from __future__ import annotations
 
 from . import affine
+from .check_contraction import stays_large
 from .check_scaling import Back, check_scaling, linear_map
 from .check_termination import check_termination, cyclic
 from .diagnostics import Diagnostics
@@ -34,10 +35,6 @@ from .model import (
 )
 from .walk import Way, components, decided, draws, is_open, leaves, reached_symbols, reads, seed_of, ways
 
-# An endless recursion is legal iff every way round it contracts, because then a detail cut-off ends it. No back end
-# has one yet. Once one has, the judgement is the forecast's, which knows the matrices of states (graph.contraction).
-CONTRACTING_IS_LEGAL = False
-
 # Guards that stay true for ever when their left side moves this way.
 UNBOUNDED = {"greater": 1, "greater_equal": 1, "less": -1, "less_equal": -1}
 
@@ -53,7 +50,7 @@ def check_recursion(model: Model, diagnostics: Diagnostics) -> None:
         if not _is_cycle(members):
             continue
         if component & endless:
-            if not CONTRACTING_IS_LEGAL:
+            if stays_large(members, seed):
                 _report_endless(members[0], members, diagnostics)
         else:
             _check_cycle(members, component, model, diagnostics)
@@ -62,9 +59,9 @@ def check_recursion(model: Model, diagnostics: Diagnostics) -> None:
 def _report_endless(symbol: Symbol, members: list[Symbol], diagnostics: Diagnostics) -> None:
     others = ", ".join(f"'{other.name}'" for other in members[1:])
     through = f" (through {others})" if others else ""
-    message = f"'{symbol.name}' never ends: each of its rules leads back to it{through}"
+    message = f"'{symbol.name}' never ends: each of its rules leads back to it{through}, and not every way round shrinks"
     hint = f"count down: if (n > 0) {symbol.name} -> … [ --n ] {symbol.name}; and a rule for the end"
-    hint += "\n(what shrinks for ever needs an end too: there is no detail cut-off yet)"
+    hint += f"\nor make every way round smaller, [ scale 0.5 ] {symbol.name}: then the detail cut-off ends it"
     diagnostics.add("endless", symbol.name_span, message, hint)
 
 

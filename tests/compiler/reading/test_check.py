@@ -113,9 +113,7 @@ def test_arguments_are_in_the_callers_scope():
 
 def test_endless_recursion():
     assert codes("Selection A { A -> box + [ trans 0 0 1 ] A; } object { A }") == ["endless"]
-    assert codes("Selection A { A -> B; } Selection B { B -> [ scale 0.5 ] A + box; } object { A }") == [
-        "endless"
-    ]
+    assert codes("Selection A { A -> B; } Selection B { B -> [ scale 2 ] A + box; } object { A }") == ["endless"]
     assert codes("Selection A { A -> 1: A | 2: [ trans 0 0 1 ] A + box; } object { A }") == ["endless"]
     assert codes("Selection A { if (1 > 0) A -> box + [ trans 0 0 1 ] A; else A -> box; } object { A }") == [
         "endless",
@@ -124,6 +122,19 @@ def test_endless_recursion():
     assert codes(
         "Selection A { if (rand(1) < 1) A -> box + [ trans 0 0 1 ] A; else A -> box; } object { A }"
     ) == ["endless", "constant-guard"]
+
+
+def test_endless_recursion_is_legal_where_every_way_round_contracts():
+    def is_endless(rules: str) -> bool:
+        return "endless" in codes(rules + " object { A }")
+
+    assert not is_endless("Selection A { A -> B; } Selection B { B -> [ scale 0.5 ] A + box; }")
+    assert not is_endless("Selection A { A -> box + [ trans 0 0 1; rotx 45; scale 0.9 ] A; }")
+    assert not is_endless("Selection A { A -> box + [ shear 5 0 0 0 0 0; scale 0.9 ] A; }")
+    assert not is_endless("Selection A { A -> [ scale 3 ] B; } Selection B { B -> box + [ scale 0.3 ] A; }")
+    assert is_endless("Selection A { A -> [ scale 3 ] B; } Selection B { B -> box + [ scale 0.4 ] A; }")
+    assert is_endless("Selection A { A -> box + [ scale 0.5 ] A + [ scale 0.5 1.1 0.5 ] A; }")
+    assert is_endless("Selection A { A -> box + [ roty 30; scale 1 ] A; }")
 
 
 def test_recursion_that_ends_by_weights_is_fine():
