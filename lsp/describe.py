@@ -220,8 +220,8 @@ def colour(name: str) -> str:
 
 
 def swatch(parts: list[float] | tuple[float, ...]) -> str:
-    """An image of a colour, as Markdown."""
-    code = "".join(f"{round(255 * max(0.0, min(1.0, each))):02x}" for each in parts[:3])
+    """An image of a colour of linear light, as Markdown."""
+    code = "".join(f"{round(255 * prose.encoded(each)):02x}" for each in parts[:3])
     picture = f"<svg xmlns='http://www.w3.org/2000/svg' width='32' height='16'><rect width='32' height='16' fill='#{code}'/></svg>"
     escaped = picture.replace("#", "%23").replace("<", "%3C").replace(">", "%3E").replace(" ", "%20")
     return f"![#{code}](data:image/svg+xml;utf8,{escaped})"

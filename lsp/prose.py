@@ -181,3 +181,18 @@ def default(value: object) -> str:
 
 def code(text: str) -> str:
     return f"```plsys\n{text}\n```"
+
+
+# --- colours
+
+
+def encoded(value: float) -> float:
+    """A component of linear light as sRGB shows it (IEC 61966-2-1), both in [0, 1]."""
+    value = max(0.0, min(1.0, value))
+    return 12.92 * value if value <= 0.0031308 else 1.055 * value ** (1 / 2.4) - 0.055
+
+
+def decoded(value: float) -> float:
+    """The inverse of :func:`encoded`."""
+    value = max(0.0, min(1.0, value))
+    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4

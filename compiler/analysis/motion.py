@@ -14,11 +14,10 @@ from typing import NamedTuple
 
 from ..reading import syntax
 from ..reading.diagnostics import Diagnostics
-from ..reading.model import Constant, Expression
-from ..reading.resolve_expressions import RULES
 from ..reading.resolve_names import Problem
 from ..reading.source import Span
-from .scene import Scene, _BlockResolver
+from .resolving import BlockResolver
+from .scene import Scene
 
 Vector = tuple[float, float, float]
 
@@ -72,16 +71,22 @@ def motion_of(scene: Scene, statements: tuple[syntax.Statement, ...]) -> Motion 
 
 def _value(scene: Scene, argument: syntax.Expression) -> tuple[float, bool] | None:
     """An argument's value, and whether it is a constant."""
-    block = argument.span.source
-    expressions = _BlockResolver(block, Diagnostics(), scene.entries).expressions
-    try:
-        number: Expression = expressions.number(argument, RULES)
-    except (Problem, RecursionError):
-        return None
-    if isinstance(number, Constant):
-        return number.value, True
+    value = constant_of(scene, argument)
+    if value is not None:
+        return value, True
     first = _first_value(scene, argument.span)
     return None if first is None else (first, False)
+
+
+def constant_of(scene: Scene, node: syntax.Expression) -> float | None:
+    """The number that an expression of the scene stands for; None if it isn't a constant."""
+    if isinstance(node, syntax.Number):
+        return node.value
+    expressions = BlockResolver(node.span.source, Diagnostics(), scene.entries, lambda name, kinds: "").expressions
+    try:
+        return expressions.constant(node)
+    except (Problem, RecursionError):
+        return None
 
 
 def _first_value(scene: Scene, span: Span) -> float | None:
