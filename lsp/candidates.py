@@ -43,7 +43,7 @@ NESTED = {
 COLOUR_BLOCKS = ("background", "light_source", "pigment", "color_map")
 FORMS = ("rgb", "rgbt", "rgbf", "rgbft")
 COLOURS = frozenset(("colour", "colours"))
-VALUES = ("value", "input")
+VALUES = {"value": 2, "input": 2}
 # After these no new item begins: a value goes on.
 VALUE_MARKS = frozenset("<,(*/%+-=?:!&|") | {"&&", "||", "==", "!=", "<=", ">="}
 SCENE_FILES = (".plsys",)
@@ -51,6 +51,8 @@ MESH_FILES = (".obj", ".ply")
 _MESH = re.compile(rb"\bmesh\s*\(\s*\"([^\"\r\n]*)$")
 _VECTOR = re.compile(rb"<[^<>{}]*$")
 MAX_DETAIL = 60
+# Names of a kind that are looked at further: more than a list shows.
+MAX_NAMES = 250
 
 
 class Candidate(NamedTuple):
@@ -72,6 +74,33 @@ def at(scene: Scene, document: Document, offset: int, context: Context) -> list[
     return list(getattr(place, context.kind, place.nothing)())
 
 
+def fit(name: str, prefix: str) -> int | None:
+    """0 for names that begin as typed, 1 whatever the case, 2 for those that have the letters in order; None for others."""
+    if name.startswith(prefix):
+        return 0
+    low, typed = name.lower(), prefix.lower()
+    if low.startswith(typed):
+        return 1
+    letters = iter(low)
+    return 2 if low[:1] == typed[:1] and all(letter in letters for letter in typed) else None
+
+
+def detailed(scene: Scene, each: Candidate) -> Candidate:
+    """With a short line about a scene's name; for a symbol with parameters the snippet of a call."""
+    entry = scene.entries.get(each.name) if each.row is None and not each.detail else None
+    if entry is None:
+        return each
+    node = entry.node
+    if isinstance(node, syntax.Selection) and node.parameters:
+        names = [name.name for name in node.parameters]
+        places = ", ".join(f"${{{i}:{name}}}" for i, name in enumerate(names, 1))
+        call = each.snippet or f"{each.name}({places})"
+        return each._replace(detail=f"Selection {each.name}({', '.join(names)})", snippet=call)
+    if isinstance(node, syntax.ParameterDeclaration | syntax.Declare):
+        return each._replace(detail=_short(node.span.text))
+    return each._replace(detail=prose.KINDS.get(each.kind, each.kind))
+
+
 def row_of(key: str, block: str) -> Row | None:
     """The row of a candidate, from what an editor sent back."""
     kind, _, name = key.partition(".")
@@ -83,7 +112,7 @@ class _Place:
 
     def __init__(self, scene: Scene, document: Document, offset: int, context: Context) -> None:
         self.scene, self.document, self.offset, self.context = scene, document, offset, context
-        self.names = scene.names()
+        self.near = {each.name for each in facts_of(document.text.block_at(max(0, offset - 1))[0]).names}
 
     def nothing(self) -> Iterator[Candidate]:
         yield from ()
@@ -103,7 +132,7 @@ class _Place:
         if self.context.previous not in snippets.DEFINITIONS:
             return
         for name in self.scene.users:
-            if name not in self.names and not vocabulary.kind_of(name) and name != self.context.prefix:
+            if name not in self.scene.entries and not vocabulary.kind_of(name) and name != self.context.prefix:
                 yield Candidate(name, "selection", 0, "used, not defined yet")
 
     def include(self) -> Iterator[Candidate]:
@@ -163,10 +192,8 @@ class _Place:
                 yield each._replace(detail="the entry action", snippet=f"{entry}$0", plain=entry)
 
     def production(self) -> Iterator[Candidate]:
-        near = {each.name for each in facts_of(self.document.text.block_at(max(0, self.offset - 1))[0]).names}
         if self.context.previous in (":", "->", "|", "+", "(", "]") or self.context.previous[:1].isalpha():
-            for each in self.scene_names(("selection", "calculation", "transformation", "texture"), 3):
-                yield each._replace(order=each.order - (each.name in near))
+            yield from self.scene_names(("selection", "calculation", "transformation", "texture"), 3)
             for row in vocabulary.PRIMITIVES.values():
                 yield self.of_row(row, 4, snippets.call(row) if row.arity != (0,) else "")
             yield Candidate("[ ]", "snippet", 6, "an inline operator", "[ $1 ] $0", "[")
@@ -201,12 +228,7 @@ class _Place:
 
     def values(self, with_parameters: bool) -> Iterator[Candidate]:
         """What an expression may begin with."""
-        if with_parameters:
-            own, _ = self.document.definition_at(self.offset)
-            mine = {name.name for name in own.node.parameters} if own and isinstance(own.node, syntax.Selection) else ()
-            for each in self.scene_names(("parameter",), 1):
-                yield each._replace(order=0) if each.name in mine else each
-        yield from self.scene_names(VALUES, 2)
+        yield from self.ordered_names({"parameter": 1, **VALUES} if with_parameters else VALUES)
         for row in vocabulary.FUNCTIONS.values():
             yield self.of_row(row, 4, snippets.call(row))
         for row in vocabulary.CONSTANTS.values():
@@ -281,23 +303,26 @@ class _Place:
     # --- candidates
 
     def scene_names(self, kinds: Iterable[str], order: int) -> Iterator[Candidate]:
-        kinds = tuple(kinds)
-        for name, kind in self.names.items():
-            if kind in kinds:
-                yield Candidate(name, kind, order, *self.detail_and_snippet(name, kind))
+        return self.ordered_names(dict.fromkeys(kinds, order))
 
-    def detail_and_snippet(self, name: str, kind: str) -> tuple[str, str]:
-        """A short line about a name; for a symbol with parameters the snippet of a call."""
-        node = self.scene.entries[name].node
-        if isinstance(node, syntax.Selection) and node.parameters:
-            names = [each.name for each in node.parameters]
-            places = ", ".join(f"${{{i}:{each}}}" for i, each in enumerate(names, 1))
-            return f"Selection {name}({', '.join(names)})", f"{name}({places})"
-        if isinstance(node, syntax.ParameterDeclaration):
-            return _short(node.span.text), ""
-        if isinstance(node, syntax.Declare):
-            return _short(node.span.text), ""
-        return prose.KINDS.get(kind, kind), ""
+    def ordered_names(self, orders: dict[str, int]) -> Iterator[Candidate]:
+        """Names of the kinds in ``orders`` that fit what is typed; those of the block come first. Of many, some."""
+        prefix, entries = self.context.prefix, self.scene.entries
+        for name in self.near:
+            order = orders.get(entries[name].kind) if name in entries else None
+            if order is not None and name != prefix:
+                yield Candidate(name, entries[name].kind, order - 1)
+        firsts = (prefix[:1].lower(), prefix[:1].upper())
+        count = 0
+        for name, entry in entries.items():
+            if prefix and name[0] not in firsts:
+                continue  # a quick look, for scenes with thousands of names
+            kind = entry.definition.kind
+            if kind in orders and (name not in self.near or name == prefix) and fit(name, prefix) is not None:
+                yield Candidate(name, kind, orders[kind])
+                count += 1
+                if count > MAX_NAMES:
+                    return
 
     @staticmethod
     def of_row(row: Row, order: int, snippet: str = "") -> Candidate:

@@ -45,9 +45,8 @@ def resolve(request: Request) -> dict[str, Any]:
     """Count the references when the lens comes into view."""
     lens = dict(request.params)
     data = lens["data"]
-    scene = request.workspace.scene(request.workspace.document(data["uri"]))
-    scene.work()
-    places = [place for place in scene.uses(data["name"]) if place.role != "definition"]
+    about = Request(request.workspace, {"textDocument": {"uri": data["uri"]}}, request.client)
+    places = [place for place in about.scene.uses(data["name"]) if place.role != "definition"]
     title = f"{len(places)} reference{'' if len(places) == 1 else 's'}"
     locations = [request.workspace.location(place) for place in places]
     arguments = [data["uri"], lens["range"]["start"], locations]

@@ -13,7 +13,7 @@ from typing import Any
 
 from plsys.compiler.analysis import context_at
 from plsys.lsp import candidates, describe, prose
-from plsys.lsp.candidates import Candidate
+from plsys.lsp.candidates import Candidate, detailed, fit
 from plsys.lsp.request import Feature, Request
 
 # More items than this slow down editor and reader; the list then says that it is incomplete.
@@ -59,19 +59,9 @@ def completion(request: Request) -> dict[str, Any]:
     range_ = request.range(start, request.offset)
     snippets = bool(request.supports("textDocument", "completion", "completionItem", "snippetSupport"))
     uri = request.params["textDocument"]["uri"]
-    items = [item(each, i, range_, snippets, uri) for i, (_, each) in enumerate(fitting[:MAX_ITEMS])]
+    shown = [detailed(request.scene, each) for _, each in fitting[:MAX_ITEMS]]
+    items = [item(each, i, range_, snippets, uri) for i, each in enumerate(shown)]
     return {"isIncomplete": len(fitting) > MAX_ITEMS, "items": items}
-
-
-def fit(name: str, prefix: str) -> int | None:
-    """0 for names that begin as typed, 1 whatever the case, 2 for those that have the letters in order; None for others."""
-    if name.startswith(prefix):
-        return 0
-    low, typed = name.lower(), prefix.lower()
-    if low.startswith(typed):
-        return 1
-    letters = iter(low)
-    return 2 if low[:1] == typed[:1] and all(letter in letters for letter in typed) else None
 
 
 def item(each: Candidate, order: int, range_: dict, snippets: bool, uri: str) -> dict[str, Any]:
@@ -100,9 +90,8 @@ def resolve(request: Request) -> dict[str, Any]:
     row = candidates.row_of(data.get("row", ""), data.get("block", ""))
     text = prose.documentation(row) if row is not None else None
     if text is None and data.get("name"):
-        scene = request.workspace.scene(request.workspace.document(data["uri"]))
-        scene.work()
-        text = describe.describe(scene, data["name"])
+        about = Request(request.workspace, {"textDocument": {"uri": data["uri"]}}, request.client)
+        text = describe.describe(about.scene, data["name"])
     if text:
         found["documentation"] = {"kind": "markdown", "value": text}
     return found

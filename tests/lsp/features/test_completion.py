@@ -161,9 +161,13 @@ def test_file_paths(tmp_path):
 
 def test_long_lists_are_cut():
     text = "Selection A { A -> <cursor>; }\n" + "".join(f"Selection S{i} {{ S{i} -> box; }}\n" for i in range(500))
-    answer = Editor(text).at_cursor("textDocument/completion")
+    editor = Editor(text)
+    editor.published()  # all of the file is read
+    answer = editor.at_cursor("textDocument/completion")
     assert answer["isIncomplete"] and len(answer["items"]) == 200
-    answer = Editor(text.replace("<cursor>", "S49<cursor>")).at_cursor("textDocument/completion")
+    editor = Editor(text.replace("<cursor>", "S49<cursor>"))
+    editor.published()
+    answer = editor.at_cursor("textDocument/completion")
     assert not answer["isIncomplete"] and {"S49", "S490", "S499"} <= {each["label"] for each in answer["items"]}
 
 
