@@ -1,6 +1,7 @@
-"""Writes what follows from vocabulary.toml: the compiler's rows, the language reference, the highlight lists.
+"""Writes what follows from vocabulary.toml and other tables: the compiler's rows, references, editors' queries.
 
 vocabulary.toml → ../compiler/reading/vocabulary_rows.py · REFERENCE.md · the lists in queries/highlights.scm
+codes and their fixtures → DIAGNOSTICS.md (diagnostics_page.py)
 
     python grammar/generate.py            write them
     python grammar/generate.py --check    compare: exit code 1 and the names of stale files
@@ -13,6 +14,8 @@ import re
 import sys
 import tomllib
 from pathlib import Path
+
+import diagnostics_page
 
 HERE = Path(__file__).resolve().parent
 BEGIN, END = "; generated from vocabulary.toml: begin", "; generated from vocabulary.toml: end"
@@ -149,6 +152,7 @@ def outputs() -> dict[Path, str]:
     files = {
         HERE.parent / "compiler/reading/vocabulary_rows.py": python_rows(table),
         HERE / "REFERENCE.md": reference(table),
+        HERE / "DIAGNOSTICS.md": diagnostics_page.page(),
     }
     queries = HERE / "queries/highlights.scm"
     if queries.exists():

