@@ -19,7 +19,8 @@ import time
 from pathlib import Path
 
 import peers
-from measures import MEASURES, Bench
+from common import Bench
+from measures import MEASURES
 from report import Results
 
 
@@ -40,10 +41,16 @@ def names(text: str) -> list[str]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="one round, without what takes minutes")
-    parser.add_argument("--only", type=names, default=list(MEASURES), metavar="NAME,…", help=f"of {', '.join(MEASURES)}")
-    parser.add_argument("--output", type=Path, default=Path("bench"), metavar="PATH", help="PATH.json and PATH.png (bench)")
+    parser.add_argument(
+        "--only", type=names, default=list(MEASURES), metavar="NAME,…", help=f"of {', '.join(MEASURES)}"
+    )
+    parser.add_argument(
+        "--output", type=Path, default=Path("bench"), metavar="PATH", help="PATH.json and PATH.png (bench)"
+    )
     arguments = parser.parse_args()
     results, started = Results(), time.perf_counter()
     facts = {

@@ -32,6 +32,12 @@ typedef void one_v4(RTCScene, struct RTCRayHit *, void *);
 typedef void many_v3(const int *, RTCScene, struct RTCIntersectContext *, void *);
 typedef void many_v4(const int *, RTCScene, void *, void *);
 
+/* The beginning of 4.4's RTCIntersectArguments, with room. */
+static struct {
+    unsigned flags, features;
+    char room[120];
+} arguments4 = {.features = 0xFFFFFFFFu};
+
 static void *one, *many8, *many16;
 static int version;
 static long long bytes;
@@ -193,7 +199,7 @@ static void single(RTCScene scene, set *s, struct RTCIntersectContext *context)
                                     .tfar = 1e30f, .mask = 0xFFFFFFFFu};
         h.ray.hit.geomID = h.ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
         if (version == 3) ((one_v3 *)one)(scene, context, &h.ray);
-        else ((one_v4 *)one)(scene, &h.ray, NULL);
+        else ((one_v4 *)one)(scene, &h.ray, &arguments4);
         s->t[i] = h.ray.hit.geomID == RTC_INVALID_GEOMETRY_ID ? 1e30f : h.ray.ray.tfar;
     }
 }
@@ -215,7 +221,7 @@ static void single(RTCScene scene, set *s, struct RTCIntersectContext *context)
                 h.ray.hit.geomID[k] = h.ray.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;                                \
             }                                                                                                          \
             if (version == 3) ((many_v3 *)function)(valid, scene, context, &h);                                        \
-            else ((many_v4 *)function)(valid, scene, &h, NULL);                                                        \
+            else ((many_v4 *)function)(valid, scene, &h, &arguments4);                                                          \
             for (unsigned k = 0; k < width && first + k < s->count; k++)                                               \
                 s->t[first + k] = h.ray.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID ? 1e30f : h.ray.ray.tfar[k];          \
         }                                                                                                              \
@@ -234,6 +240,7 @@ static void measure(const char *name, void (*run)(RTCScene, set *, struct RTCInt
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     if (s->coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    arguments4.flags = s->coherent ? 1u << 16 : 0; /* RTC_RAY_QUERY_FLAG_COHERENT */
     double *rates = malloc(sizeof *rates * (size_t)repeats);
     for (int i = 0; i < repeats; i++) {
         double start = now();

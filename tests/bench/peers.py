@@ -17,7 +17,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -39,23 +38,32 @@ class Run:
     text: str
 
 
+@cache
+def launcher() -> subprocess.Popen:
+    command = [sys.executable, "-S", "-E", str(HERE / "launcher.py")]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
 def run(command: list, request: object = None, pinned: bool = True, folder: Path | None = None) -> Run:
     """Runs a program to its end. RuntimeError with its last words if it fails."""
     prefix = PINNED if pinned and shutil.which("taskset") else ()
-    with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as said:
-        if request is not None:
-            given.write(json.dumps(request).encode())
-            given.seek(0)
-        start = time.perf_counter()
-        process = subprocess.Popen([*prefix, *map(str, command)], stdin=given, stdout=said, stderr=subprocess.STDOUT, cwd=folder)
-        _, status, usage = os.wait4(process.pid, 0)
-        wall = time.perf_counter() - start
-        process.returncode = os.waitstatus_to_exitcode(status)
-        said.seek(0)
-        text = said.read().decode(errors="replace")
-    if process.returncode:
-        raise RuntimeError(f"{command[0]} failed ({process.returncode}): {text[-600:]}")
-    return Run(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024, text)
+    with tempfile.TemporaryDirectory() as place:
+        given, said = Path(place) / "in", Path(place) / "out"
+        given.write_text("" if request is None else json.dumps(request))
+        order = {
+            "command": [*prefix, *map(str, command)],
+            "stdin": str(given),
+            "stdout": str(said),
+            "folder": folder and str(folder),
+        }
+        print(json.dumps(order), file=launcher().stdin, flush=True)
+        answer = json.loads(launcher().stdout.readline())
+        text = said.read_text(errors="replace")
+    if answer["status"]:
+        raise RuntimeError(
+            f"{Path(order['command'][len(prefix)]).name} failed ({answer['status']}): {text[-600:]}"
+        )
+    return Run(answer["wall"], answer["cpu"], answer["rss"], text)
 
 
 def plsys(*arguments: object, pinned: bool = False) -> Run:
@@ -81,7 +89,9 @@ def embree_program(folder: Path) -> Path | None:
     program = folder / "embree"
     compiler = shutil.which("cc")
     done = compiler and subprocess.run(
-        [compiler, "-O2", "-std=gnu11", "-o", program, HERE / "embree.c", "-ldl"], capture_output=True, text=True
+        [compiler, "-O2", "-std=gnu11", "-o", program, HERE / "embree.c", "-ldl"],
+        capture_output=True,
+        text=True,
     )
     if not done or done.returncode:
         MISSING["embree"] = "Embree's header is missing: apt-get install libembree-dev"
@@ -107,7 +117,9 @@ def embree_libraries() -> dict[str, str]:
     return found
 
 
-def embree(case, scene: Path, folder: Path, version: str = "3.13", flags: str = "-", repeats: int = 3) -> dict | None:
+def embree(
+    case, scene: Path, folder: Path, version: str = "3.13", flags: str = "-", repeats: int = 3
+) -> dict | None:
     """embree.c's answer, with t of all rays under "t", by set."""
     program, library = embree_program(folder), embree_libraries().get(version)
     if not program or not library:
@@ -133,7 +145,16 @@ def povray(case, folder: Path, width: int = 640, height: int = 480, threads: int
     scene = folder / "povray.pov"
     parameters = [x for name, value in case.parameters.items() for x in ("-D", f"{name}={value}")]
     plsys("export", case.path, "-o", scene, *parameters)
-    command = ["povray", f"+I{scene}", f"+O{folder / 'povray.png'}", f"+W{width}", f"+H{height}", "-A", "-D", "+FN8"]
+    command = [
+        "povray",
+        f"+I{scene}",
+        f"+O{folder / 'povray.png'}",
+        f"+W{width}",
+        f"+H{height}",
+        "-A",
+        "-D",
+        "+FN8",
+    ]
     done = run([*command, *([f"+WT{threads}"] if threads else [])], pinned=threads == 1)
     seconds = {
         name.lower(): float(value)

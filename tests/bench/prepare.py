@@ -40,7 +40,9 @@ class Case:
     """One scene with parameters: its text in `folder`, camera, and rays (seeded, in single precision so that all
     programs get the same bits)."""
 
-    def __init__(self, name: str, scene: str, parameters: dict, folder: Path, text: str | None = None, size=(320, 240)) -> None:
+    def __init__(
+        self, name: str, scene: str, parameters: dict, folder: Path, text: str | None = None, size=(640, 480)
+    ) -> None:
         self.name, self.parameters, self.size = name, parameters, size
         self.folder = folder / name.replace(" ", "-")
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -54,17 +56,22 @@ class Case:
 
     @cached_property
     def camera(self) -> dict[str, np.ndarray]:
-        record = {"sky": (0, 1, 0), "right": (4 / 3, 0, 0), "up": (0, 1, 0)} | dict(self.compilation.graph.camera.values)
+        record = {"sky": (0, 1, 0), "right": (4 / 3, 0, 0), "up": (0, 1, 0)} | dict(
+            self.compilation.graph.camera.values
+        )
         return {name: np.array(value, float) for name, value in record.items()}
 
     @cached_property
     def rays(self) -> dict[str, np.ndarray]:
         coherent = camera_rays(self.camera, *self.size)
         with Scene(self.compilation.encode(), threads=1) as scene:
-            o, d = coherent[::7, :3].astype(float), coherent[::7, 3:].astype(float)
+            few = coherent[:: max(1, len(coherent) // 10_000)].astype(float)
+            o, d = few[:, :3], few[:, 3:]
             t = scene.intersect(o, d).t
-        points = (o + t[:, None] * d)[np.isfinite(t)]
-        return {"coherent": coherent, "random": random_rays(points.min(0), points.max(0), len(coherent) // 2)}
+        points = (o + np.where(np.isfinite(t), t, 0)[:, None] * d)[np.isfinite(t)]
+        if len(points) == 0:
+            raise RuntimeError(f"{self.name}: its camera sees nothing")
+        return {"coherent": coherent, "random": random_rays(points.min(0), points.max(0), len(coherent) // 4)}
 
     @cached_property
     def rays_path(self) -> Path:
@@ -86,7 +93,9 @@ class Case:
         """kinds (n,) names, matrices (n, 3, 4), arguments (n,), parameters (n, slots) of all generated primitives."""
         batches = [b.take(b.symbol >= 0) for b in unfold(self.compilation.graph)]
         kinds = sum((b.kinds for b in batches), [])
-        return kinds, *(np.concatenate([getattr(b, f) for b in batches]) for f in ("matrix", "argument", "parameters"))
+        return kinds, *(
+            np.concatenate([getattr(b, f) for b in batches]) for f in ("matrix", "argument", "parameters")
+        )
 
 
 def camera_rays(camera: dict, width: int, height: int) -> np.ndarray:
@@ -102,7 +111,9 @@ def camera_rays(camera: dict, width: int, height: int) -> np.ndarray:
     y, x = np.mgrid[0:height, 0:width]
     order = np.lexsort((x.ravel() % TILE, y.ravel() % TILE, x.ravel() // TILE, y.ravel() // TILE))
     x, y = (v.ravel()[order, None] for v in (x, y))
-    directions = distance * d + ((x + 0.5) / width - 0.5) * hand * right * r + (0.5 - (y + 0.5) / height) * up * u
+    directions = (
+        distance * d + ((x + 0.5) / width - 0.5) * hand * right * r + (0.5 - (y + 0.5) / height) * up * u
+    )
     return as_rays(np.broadcast_to(camera["location"], directions.shape), directions)
 
 
@@ -140,7 +151,9 @@ def triangles_of(quads: np.ndarray) -> np.ndarray:
     return np.stack([q[:, [0, 1, 2]], q[:, [0, 2, 3]]], axis=1).reshape(-1, 9)
 
 
-def write_embree(path: Path, groups: list[tuple[int, np.ndarray]], instances: list[tuple[int, np.ndarray]]) -> Path:
+def write_embree(
+    path: Path, groups: list[tuple[int, np.ndarray]], instances: list[tuple[int, np.ndarray]]
+) -> Path:
     """embree.c's scene file."""
     with open(path, "wb") as file:
         file.write(struct.pack("<I", len(groups)))

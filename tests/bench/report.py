@@ -1,7 +1,7 @@
 """The bench's results: rows with their targets, as a table, JSON and plots.
 
-    results.row("order 20", "coherent, of Embree single rays", [1.1, 1.2, 1.3], 1.0)
-    results.note("order 20", "Embree needs 214 MB")
+results.row("order 20", "coherent, of Embree single rays", [1.1, 1.2, 1.3], 1.0)
+results.note("order 20", "Embree needs 214 MB")
 """
 
 from __future__ import annotations
@@ -50,7 +50,18 @@ class Results:
     def row(self, scene: str, what: str, values, target: float | None = None, unit: str = "×", at_most: bool = False,
             ours: str = "", theirs: str = "") -> None:  # fmt: skip
         ordered = sorted(values if isinstance(values, (list, tuple)) else [values])
-        row = Row(scene, what, ordered[0], ordered[len(ordered) // 2], ordered[-1], unit, target, at_most, ours, theirs)
+        row = Row(
+            scene,
+            what,
+            ordered[0],
+            ordered[len(ordered) // 2],
+            ordered[-1],
+            unit,
+            target,
+            at_most,
+            ours,
+            theirs,
+        )
         self.rows.append(row)
         print(row.line(), flush=True)
 
@@ -60,7 +71,9 @@ class Results:
 
     def write(self, path: Path, facts: dict) -> None:
         rows = [asdict(row) | {"met": row.met} for row in self.rows]
-        path.write_text(json.dumps(facts | {"rows": rows, "notes": self.notes, "curves": self.curves}, indent=1) + "\n")
+        path.write_text(
+            json.dumps(facts | {"rows": rows, "notes": self.notes, "curves": self.curves}, indent=1) + "\n"
+        )
 
     def plot(self, path: Path) -> str | None:
         """Draws the curves; a message if it can't."""
@@ -85,8 +98,14 @@ class Results:
                 axes[1].plot(x, [p["build_seconds"] for p in points], "s--", label="build, s")
                 axes[1].plot(x, [p["coherent"] for p in points], "^:", label="coherent, Mray/s")
             if name.startswith("threads"):
-                axes[2].plot([p["threads"] for p in points], [p["rate"] for p in points], "o-", label=name[9:])
-        for axis, title, x in zip(axes, ("Memory for time: items a front", "Growth: Menger 2 to 10", "Threads"), ("MB", "primitives", "threads")):
+                axes[2].plot(
+                    [p["threads"] for p in points], [p["rate"] for p in points], "o-", label=name[9:]
+                )
+        for axis, title, x in zip(
+            axes,
+            ("Memory for time: items a front", "Growth: Menger 2 to 10", "Threads"),
+            ("MB", "primitives", "threads"),
+        ):
             axis.set(title=title, xlabel=x)
             if axis is not axes[2]:
                 axis.set_xscale("log")

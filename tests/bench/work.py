@@ -38,7 +38,9 @@ def intersect(scene: Scene, origins: np.ndarray, directions: np.ndarray, t: np.n
 
 
 def measure(scene: Scene, rays: np.ndarray, repeats: int, most_seconds: float) -> dict:
-    origins, directions = (np.ascontiguousarray(rays[:, part], np.float64) for part in (slice(0, 3), slice(3, 6)))
+    origins, directions = (
+        np.ascontiguousarray(rays[:, part], np.float64) for part in (slice(0, 3), slice(3, 6))
+    )
     t = np.empty(len(rays))
     few = min(len(rays), 512)
     spread = np.linspace(0, len(rays) - 1, few).astype(int)
@@ -80,7 +82,8 @@ def main() -> None:
             np.savez(request["hits"], **t)
         statistics = scene.statistics
     answer |= {
-        name: statistics[name] for name in ("scene_bytes", "primitives", "states", "box_tests", "primitive_tests")
+        name: statistics[name]
+        for name in ("scene_bytes", "primitives", "states", "box_tests", "primitive_tests")
     }
     answer["rss_growth"] = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
     json.dump(answer, sys.stdout)

@@ -56,9 +56,14 @@ def test_hits_are_those_of_none_at_any_resolution(name):
     assert_same(encode(SCENES[name]), [None, *SIZES])
 
 
-@pytest.mark.parametrize("scene, parameters", [("tree", {}), ("menger", {"level": 3}), ("conifer", {}), ("bush", {}), ("koch", {"level": 2})])
+@pytest.mark.parametrize(
+    "scene, parameters",
+    [("tree", {}), ("menger", {"level": 3}), ("conifer", {}), ("bush", {}), ("koch", {"level": 2})],
+)
 def test_hits_in_example_scenes(scene, parameters):
-    assert_same(build(Source.read(f"scenes/{scene}.plsys"), parameters=parameters).encode(), [None, (64, 64, 64)])
+    assert_same(
+        build(Source.read(f"scenes/{scene}.plsys"), parameters=parameters).encode(), [None, (64, 64, 64)]
+    )
 
 
 def test_rays_from_far_away_and_along_the_voxels_walls():
@@ -86,7 +91,11 @@ def test_a_scene_through_glass_counts_every_hit_once():
         Calculation C_all { n = 5; }"""
     data = compile(CAMERA + text)
     images = []
-    for options in ({"accelerator": "none"}, {"accelerator": "grid"}, {"accelerator": "grid", "grid": (31, 33, 29)}):
+    for options in (
+        {"accelerator": "none"},
+        {"accelerator": "grid"},
+        {"accelerator": "grid", "grid": (31, 33, 29)},
+    ):
         with Scene(data, **options) as scene:
             images.append(scene.render(60, 45)["color"])
     np.testing.assert_array_equal(images[1], images[0])
@@ -103,7 +112,11 @@ def test_more_voxels_take_more_memory_and_fewer_tests():
     """The paper's trade: memory for time."""
     data = encode(SCENES["scattered"], level=6)
     costs = []
-    for options in ({"accelerator": "boxes"}, {"accelerator": "grid"}, {"accelerator": "grid", "grid": (128, 128, 16)}):
+    for options in (
+        {"accelerator": "boxes"},
+        {"accelerator": "grid"},
+        {"accelerator": "grid", "grid": (128, 128, 16)},
+    ):
         with Scene(data, **options) as scene:
             scene.render(40, 30)
             costs.append((scene.statistics["scene_bytes"], scene.statistics["box_tests"]))

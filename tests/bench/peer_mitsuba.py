@@ -99,5 +99,15 @@ def render(path: Path, width: int, height: int) -> peers.Run | None:
     command = program()
     if not command:
         return None
-    arguments = ["-m", "scalar_rgb", "-D", f"w={width}", "-D", f"h={height}", "-o", path.with_suffix(".exr"), path]
+    arguments = [
+        "-m",
+        "scalar_rgb",
+        "-D",
+        f"w={width}",
+        "-D",
+        f"h={height}",
+        "-o",
+        path.with_suffix(".exr"),
+        path,
+    ]
     return peers.run([command, *arguments], pinned=False)

@@ -1,0 +1,101 @@
+"""What the bench's measures share: ratios of rates against Embree, agreement of hits, rendered pictures.
+
+Ratios are ours : theirs, of the same rays in the same round; rounds alternate between the programs, so that a noisy
+machine disturbs both.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from peers import embree, ours, plsys
+from prepare import Case, cone_curves
+from report import Results
+
+ALL = 2**64 - 1
+SETS = ("coherent", "random")
+
+
+@dataclass
+class Bench:
+    folder: Path
+    results: Results
+    quick: bool
+
+    @property
+    def rounds(self) -> int:
+        return 1 if self.quick else 3
+
+
+def median(values) -> float:
+    return sorted(values)[len(values) // 2]
+
+
+def rate(answer: dict, name: str, key: str = "rates") -> float:
+    return answer["sets"][name][key][1]
+
+
+def against_embree(bench: Bench, case: Case, scene: Path, options: dict, targets: dict, what: str, version: str = "3.13", key: str = "single",
+                   flags: str = "-") -> tuple[dict, dict] | None:  # fmt: skip
+    """Rows of ratios for both kinds of rays; the last answers of both."""
+    pairs = []
+    for _ in range(bench.rounds):
+        mine, theirs = ours(case, options=options), embree(case, scene, case.folder, version, flags)
+        if "failed" in mine:
+            bench.results.note(case.name, f"{what}: ours failed: {mine['failed']}")
+            return None
+        if theirs is None:
+            return None
+        pairs.append((mine, theirs))
+    for name in SETS:
+        ratios = [rate(mine, name) / rate(theirs, name, key) for mine, theirs in pairs]
+        bench.results.row(
+            case.name, f"{name}: {what}", ratios, targets.get(name),
+            ours=f"{median([rate(m, name) for m, _ in pairs]):.2f} Mray/s", theirs=f"{median([rate(t, name, key) for _, t in pairs]):.2f}",
+        )  # fmt: skip
+    return pairs[-1]
+
+
+def same_hits(bench: Bench, case: Case, answer: dict) -> None:
+    """Says how many rays Embree answers otherwise, so that nobody compares unlike things."""
+    path = case.folder / "hits.npz"
+    ours(case, hits=str(path), repeats=1)
+    with np.load(path) as mine:
+        for name in SETS:
+            a, b = mine[name], answer["t"][name]
+            both = np.isfinite(a) & np.isfinite(b)
+            other = np.isfinite(a) != np.isfinite(b)
+            other[both] = np.abs(a[both] - b[both]) > 1e-3 * (1 + a[both])
+            bench.results.note(
+                case.name,
+                f"{name}: Embree {answer['version']} answers {other.mean():.2%} of the rays otherwise",
+            )
+
+
+def curves_of(case: Case) -> np.ndarray:
+    return cone_curves(case.unfolded()[1])
+
+
+def pixels_traced(case: Case, *options: object) -> dict:
+    """`plsys render --json` of 640x480 with one thread."""
+    parameters = [x for name, value in case.parameters.items() for x in ("-D", f"{name}={value}")]
+    done = plsys(
+        "render",
+        case.path,
+        "-o",
+        case.folder / "ours.png",
+        "--threads",
+        1,
+        "--json",
+        *parameters,
+        *options,
+        pinned=True,
+    )
+    return json.loads(done.text[done.text.index("{") :]) | {
+        "wall": done.wall,
+        "cpu": done.cpu,
+        "rss": done.rss,
+    }
