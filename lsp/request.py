@@ -34,9 +34,11 @@ class Request:
 
     @cached_property
     def scene(self) -> Scene:
-        """The document's scene, with all that edits touched resolved."""
+        """The document's scene, with all that edits touched resolved. (Of a long file that is just being opened, with
+        what is known by now: see EARLY in session.py.)"""
         scene = self.workspace.scene(self.document)
-        scene.work()
+        if not scene.is_opening or self.document.version is None:
+            scene.work()
         return scene
 
     @cached_property

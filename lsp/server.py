@@ -68,6 +68,8 @@ class Dispatcher:
         waiting = (each for each in self.inbox if isinstance(each, dict) and "method" in each)
         if isinstance(number, int | str) and any(each.get("id") == number for each in waiting):
             self.cancelled.add(number)
+        else:
+            self.session.cancel(number)
 
     def _schedule(self) -> None:
         if not self._scheduled:

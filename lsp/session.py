@@ -14,6 +14,7 @@ Example::
 from __future__ import annotations
 
 import logging
+import time
 from collections import deque
 from importlib import import_module
 from pkgutil import iter_modules
@@ -29,10 +30,18 @@ from .workspace import UnknownDocument, Workspace, path_of
 logger = logging.getLogger(__name__)
 
 PARSE_ERROR, INVALID_REQUEST, METHOD_NOT_FOUND, INVALID_PARAMS, INTERNAL_ERROR = -32700, -32600, -32601, -32602, -32603
-NOT_INITIALIZED, REQUEST_CANCELLED = -32002, -32800
+NOT_INITIALIZED, REQUEST_CANCELLED, CONTENT_MODIFIED = -32002, -32800, -32801
 
-# How long work() may go on before waiting messages are looked at, in seconds.
-SLICE = 0.008
+# How long work() may go on before waiting messages are looked at, in seconds; and how often diagnostics are published
+# while it isn't done. The first ones are published at once.
+SLICE = 0.006
+PUBLISH_S = 0.1
+
+# What is answered while a long file is being opened, as far as it is known; other requests wait until all of it is read.
+EARLY = frozenset((
+    "textDocument/completion", "textDocument/hover", "textDocument/onTypeFormatting", "textDocument/rangeFormatting",
+    "textDocument/selectionRange", "textDocument/semanticTokens/range", "textDocument/signatureHelp",
+))  # fmt: skip
 
 # Files whose changes on disk matter: scenes, and the meshes that they use.
 WATCHED = ("**/*.plsys", "**/*.obj", "**/*.ply")
@@ -73,6 +82,9 @@ class Session:
         self._initialized = self._shut_down = False
         self._changed: dict[Document, None] = {}  # open documents whose diagnostics may be out of date
         self._published: dict[str, tuple[int | None, list[dict]]] = {}
+        self._published_at: dict[Document, float] = {}  # of those with work left
+        self._waiting: list[dict] = []  # requests about files that are being opened
+        self._shown_early = False  # semantic tokens were sent without knowing all names
         self._next_id = 0
         self._notifications: dict[str, Callable[[dict], None]] = {
             "textDocument/didOpen": self._did_open,
@@ -96,12 +108,38 @@ class Session:
             return  # an answer to a request of ours; none needs one
         params = message.get("params")
         if number is not None:
-            self._request(number, method, params if isinstance(params, dict) else {})
+            params = params if isinstance(params, dict) else {}
+            if self._must_wait(method):
+                self._waiting.append(message)
+            else:
+                self._request(number, method, params)
         elif method in self._notifications and (self._initialized or method == "exit"):
             try:
                 self._notifications[method](params if isinstance(params, dict) else {})
             except Exception:
                 logger.exception("%s failed", method)
+
+    def _must_wait(self, method: str) -> bool:
+        """Whether an answer needs files that are still being read."""
+        if method not in self.features or self._shut_down or not self.workspace.is_opening:
+            return False
+        self._shown_early |= method.startswith("textDocument/semanticTokens")
+        return method not in EARLY
+
+    def cancel(self, number: Any) -> None:
+        """Drop a request that waits for a file to be opened."""
+        for message in [each for each in self._waiting if each["id"] == number]:
+            self._waiting.remove(message)
+            self.refuse_cancelled(number)
+
+    def _answer_waiting(self) -> None:
+        waiting, self._waiting = self._waiting, []
+        for message in waiting:
+            self.receive(message)
+        refresh = ((self.client.get("workspace") or {}).get("semanticTokens") or {}).get("refreshSupport")
+        if refresh and self._shown_early:
+            self.ask("workspace/semanticTokens/refresh")
+        self._shown_early = False
 
     def _request(self, number: Any, method: str, params: dict) -> None:
         if method == "initialize":
@@ -213,8 +251,12 @@ class Session:
 
     def _did_change(self, params: dict) -> None:
         given = params["textDocument"]
+        for message in [each for each in self._waiting if _uri(each) == given["uri"]]:
+            self._waiting.remove(message)
+            self._refuse(message["id"], CONTENT_MODIFIED, "the text has changed")
         document = self.workspace.did_change(given["uri"], given["version"], params["contentChanges"])
         if document is not None:
+            self._published_at.pop(document, None)
             self._touch(document)
 
     def _did_close(self, params: dict) -> None:
@@ -260,20 +302,34 @@ class Session:
 
     @property
     def has_work(self) -> bool:
-        return bool(self._changed or self._results)
+        return bool(self._changed or self._results) or self.workspace.is_opening
 
     def work(self) -> None:
-        """Resolve for a moment what edits touched, and publish what is known. Call it until ``has_work`` is false."""
+        """Read and resolve for a moment what edits touched, and publish what is known. Call it until ``has_work`` is
+        false."""
         while self._results:
             self._take(self._results.popleft())
         finished = self.workspace.project.work(SLICE)
-        pulls = (self.client.get("textDocument") or {}).get("diagnostic") is not None
-        documents = list(self._changed)
+        documents, now = self._with_neighbours(), time.perf_counter()
         if finished:
             self._changed.clear()
-        if not pulls:
+        if (self.client.get("textDocument") or {}).get("diagnostic") is None:
             for document in documents:
-                self._publish(document)
+                if finished or now - self._published_at.get(document, 0.0) > PUBLISH_S:
+                    self._publish(document)
+                    self._published_at[document] = now
+        if finished:
+            self._published_at.clear()
+        if (self._waiting or self._shown_early) and not self.workspace.is_opening:
+            self._answer_waiting()
+
+    def _with_neighbours(self) -> list[Document]:
+        """The open documents that changed or are in a scene with one that did: an edit may have changed which."""
+        found = dict(self._changed)
+        for document in self._changed:
+            for scene in document.scenes:
+                found.update((other, None) for other in scene.documents if other in self.workspace.uris)
+        return list(found)
 
     def start_checks(self) -> None:
         """Have what changed checked as a whole. To be called when the client has paused."""
@@ -307,3 +363,9 @@ class Session:
         self._published[uri] = document.version, found
         params = {"uri": uri, "version": document.version, "diagnostics": found}
         self.notify("textDocument/publishDiagnostics", params)
+
+
+def _uri(message: dict) -> str | None:
+    params = message.get("params")
+    document = params.get("textDocument") if isinstance(params, dict) else None
+    return document.get("uri") if isinstance(document, dict) else None

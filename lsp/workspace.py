@@ -99,6 +99,11 @@ class Workspace:
         except OSError:
             raise UnknownDocument(uri) from None
 
+    @property
+    def is_opening(self) -> bool:
+        """Whether a long file is still being read: most of its names aren't known yet."""
+        return any(scene.is_opening for scene in self.project.scenes.values())
+
     def scene(self, document: Document) -> Scene:
         return self.project.scene_of(document)
 

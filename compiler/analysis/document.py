@@ -87,25 +87,12 @@ class Document:
 
     def edit(self, start: int, end: int, data: bytes) -> Change:
         """Put ``data`` in the place of the bytes from ``start`` to ``end``."""
-        return self.edits(((start, end, data),))
+        return self.text.replace(start, end, data)
 
-    def edits(self, edits: Iterable[tuple[int, int, bytes]]) -> Change:
+    def edits(self, edits: Iterable[tuple[int, int, bytes]]) -> list[Change]:
         """Several edits one after the other, each in the coordinates that the one before left. ``edits`` may be a
-        generator that looks at the text. The change is that of all together, so that what a block was in between is
-        never read."""
-        removed: dict[Block, None] = {}
-        added: dict[Block, None] = {}
-        for start, end, data in edits:
-            change = self.text.replace(start, end, data)
-            for block in change.removed:
-                if block in added:
-                    del added[block]
-                else:
-                    removed[block] = None
-            added.update(dict.fromkeys(change.added))
-        change = Change(list(removed), list(added))
-        self._keep_lost(change)
-        return change
+        generator that looks at the text."""
+        return [self.text.replace(start, end, data) for start, end, data in edits]
 
     def set(self, data: bytes) -> Change:
         """Replace the whole text, as one edit of what differs."""
@@ -114,26 +101,10 @@ class Document:
         start = next((i for i in range(0, same, 4096) if old[i : i + 4096] != data[i : i + 4096]), same)
         return self.edit(min(start, same), len(old), data[min(start, same) :])
 
-    @staticmethod
-    def _keep_lost(change: Change) -> None:
-        """Definitions that a syntax error has swallowed live on, so that a half-typed line isn't answered by
-        messages wherever its block is used."""
-        if not change.removed:
-            return
-        broken = next((block for block in change.added if facts_of(block).is_broken), None)
-        if broken is None:
-            return
-        kept = {d.name for block in change.added for d in facts_of(block).definitions}
-        for block in change.removed:
-            facts = facts_of(block)
-            for each in (*facts.ghosts.values(), *facts.definitions):
-                if each.name not in kept:
-                    facts_of(broken).ghosts[each.name] = each
-
     # --- asking
 
     def includes(self) -> list[syntax.Include]:
-        return [node for block in self.text.blocks for node in facts_of(block).includes]
+        return [node for block in self.text.blocks if b"include" in block.data for node in facts_of(block).includes]
 
     def included_paths(self, offset: int | None = None) -> list[tuple[Place, Path]]:
         """The quoted names of included files with the paths that they stand for; only those in the block at
@@ -141,7 +112,7 @@ class Document:
         found = []
         pairs = zip(self.text.blocks, self.text.starts) if offset is None else [self.text.block_at(offset)]
         for block, base in pairs:
-            for node in facts_of(block).includes:
+            for node in facts_of(block).includes if b"include" in block.data else ():
                 path = (self.path.parent if self.path is not None else Path()) / node.path.value
                 found.append((Place(self, base + node.path.span.start, base + node.path.span.end), path))
         return found

@@ -19,7 +19,7 @@ from ..reading.grammar import syntax_tree
 from ..reading.parse import convert
 from ..reading.resolve_names import assigned_names, kind_of_definition
 from ..reading.source import Span
-from .text import Block
+from .text import Block, Change
 
 if TYPE_CHECKING:
     from tree_sitter import Tree
@@ -101,6 +101,20 @@ def facts_of(block: Block) -> Facts:
         found = block.__dict__["facts"] = _read(block)
         block.__dict__["before"] = None  # of no more use, and a chain of all texts there ever were
     return found
+
+
+def keep_lost(change: Change) -> None:
+    """Definitions that a syntax error has swallowed live on in a block that is broken now, so that a half-typed line
+    isn't answered by messages wherever its block is used."""
+    broken = next((block for block in change.added if facts_of(block).is_broken), None)
+    if broken is None:
+        return
+    kept = {d.name for block in change.added for d in facts_of(block).definitions}
+    for block in change.removed:
+        facts = facts_of(block)
+        for each in (*facts.ghosts.values(), *facts.definitions):
+            if each.name not in kept:
+                facts_of(broken).ghosts[each.name] = each
 
 
 def _read(block: Block) -> Facts:

@@ -48,7 +48,7 @@ class Project:
         if document is None:
             document = self.documents[key] = Document(path, data, version)
         else:
-            self._changed(document, document.set(data))
+            self._changed(document, [document.set(data)])
             document.version = version
         self._find_scenes()
         return document
@@ -64,7 +64,7 @@ class Project:
         if document.version is not None or document.path is None:
             return
         try:
-            self._changed(document, document.set(document.path.read_bytes()))
+            self._changed(document, [document.set(document.path.read_bytes())])
         except OSError:
             self.documents.pop(_key(document.path), None)
         self._look_for_includes()
@@ -84,9 +84,10 @@ class Project:
         """See Document.edits."""
         self._changed(document, document.edits(edits))
 
-    def _changed(self, document: Document, change: Change) -> None:
+    def _changed(self, document: Document, changes: Iterable[Change]) -> None:
         for scene in list(document.scenes):
-            scene.changed(document, change)
+            for change in changes:
+                scene.changed(change)
 
     def _look_for_includes(self) -> None:
         for scene in list(self.scenes.values()):

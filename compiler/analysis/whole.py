@@ -225,6 +225,7 @@ def _numbers(prediction) -> dict[str, Any] | None:
 
 def run(scene: Scene) -> None:
     """Check ``scene`` here and now."""
+    scene.work()
     snapshot = Snapshot.of(scene, 0)
     Work().run(snapshot.request, lambda answer: Result(snapshot, answer).apply())
 

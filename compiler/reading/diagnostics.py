@@ -16,20 +16,15 @@ Example::
 
 from __future__ import annotations
 
-import difflib
-import heapq
-import operator
 import re
 from dataclasses import dataclass, field
 from typing import Iterable
 
 from .codes import CODES
+from .nearest import nearest as nearest
 from .source import Source, Span
 
 SEVERITIES = ("error", "warning", "info")
-
-# From this number of candidates on, nearest() compares the likeliest ones only.
-MANY_NAMES = 400
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,19 +93,6 @@ class Diagnostics:
 
     def sorted(self) -> list[Diagnostic]:
         return sorted(self.items, key=lambda d: (d.span.source.name, d.span.start, SEVERITIES.index(d.severity)))
-
-
-def nearest(name: str, candidates: Iterable[str]) -> str:
-    """A hint that names the closest candidate, or ''."""
-    names = list(candidates)
-    if len(names) > MANY_NAMES:
-        # A full comparison takes some 100 µs. Of many names, only those of like length that begin or end alike are
-        # worth it, and of these the ones that have most letters in the same places.
-        head, tail, least, most = name[:2], name[-2:], len(name) - 2, len(name) + 2
-        names = [other for other in names if least <= len(other) <= most and (other[:2] == head or other[-2:] == tail)]
-        names = heapq.nlargest(20, names, key=lambda other: sum(map(operator.eq, name, other)))
-    matches = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    return f"did you mean '{matches[0]}'?" if matches else ""
 
 
 def render(diagnostic: Diagnostic) -> str:

@@ -48,10 +48,10 @@ def resolve(
     files (an editor gives what it has open) and raises OSError. Messages are added to ``diagnostics``; nothing
     is raised for what a scene holds.
     """
-    return _Resolver(file, diagnostics, dict(parameters or {}), seed, loader).run()
+    return Resolver(file, diagnostics, dict(parameters or {}), seed, loader).run()
 
 
-class _Resolver:
+class Resolver:
     """Wires the resolve modules together and holds what they share: constants, the seed and meshes."""
 
     def __init__(

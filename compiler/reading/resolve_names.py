@@ -230,7 +230,7 @@ class Names:
         if entry.kind not in kinds:
             note = Note(entry.definition.span, f"'{name.name}' is defined here")
             message = f"'{name.name}' is {ARTICLES[entry.kind]}, not {wanted}"
-            raise Problem("wrong-kind", name.span, message, self._suggest(name, kinds), (note,))
+            raise Problem("wrong-kind", name.span, message, self.nearest(name.name, kinds), (note,))
         return entry
 
     def unknown(self, name: syntax.Name, kinds: tuple[str, ...], wanted: str) -> Problem:
@@ -238,27 +238,32 @@ class Names:
         if taken := vocabulary.kind_of(name.name):
             message = f"'{name.name}' is {ARTICLES[taken]}, not {wanted}"
             hint = (
-                "perhaps a ';' is missing before it" if taken == "operation" else self._suggest(name, kinds)
+                "perhaps a ';' is missing before it" if taken == "operation" else self.nearest(name.name, kinds)
             )
             return Problem("wrong-kind", name.span, message, hint)
         if name.name in vocabulary.UNSUPPORTED:
             return unsupported(name)
-        hint = self._suggest(name, kinds) or nearest(name.name, self.entries)
+        hint = self.nearest(name.name, kinds) or self.nearest(name.name, None)
         return Problem(
             "unknown-name", name.span, f"unknown name '{name.name}': {wanted} is needed here", hint
         )
 
-    def _suggest(self, name: syntax.Name, kinds: tuple[str, ...]) -> str:
-        rows = {
-            "primitive": vocabulary.PRIMITIVES,
-            "function": vocabulary.FUNCTIONS,
-            "constant": vocabulary.CONSTANTS,
-        }
-        names = [other for other, entry in self.entries.items() if entry.kind in kinds]
-        names += [other for kind in kinds for other in rows.get(kind, ())]
-        if "colour" in kinds:
-            names += vocabulary.COLOURS
-        return nearest(name.name, [other for other in names if other != name.name])
+    def nearest(self, name: str, kinds: tuple[str, ...] | None) -> str:
+        """A hint that names what of ``kinds`` is most like ``name``; of the scene's names of any kind for None."""
+        if kinds is None:
+            return nearest(name, self.entries)
+        names = {other for other, entry in self.entries.items() if entry.kind in kinds and other != name}
+        return nearest(name, names.union(*(vocabulary_names(kind) for kind in kinds)) - {name})
+
+
+def vocabulary_names(kind: str) -> Iterable[str]:
+    """The vocabulary's names of a kind that :class:`Names` is asked for."""
+    return {
+        "primitive": vocabulary.PRIMITIVES,
+        "function": vocabulary.FUNCTIONS,
+        "constant": vocabulary.CONSTANTS,
+        "colour": vocabulary.COLOURS,
+    }.get(kind, ())
 
 
 def unsupported(name: syntax.Name) -> Problem:

@@ -82,6 +82,8 @@ class Editor:
         self.texts[name] = text
         document = {"uri": self.uri(name), "languageId": "plsys", "version": 1, "text": text}
         self.notify("textDocument/didOpen", {"textDocument": document})
+        while self.session.workspace.is_opening:
+            self.session.work()
 
     def change(self, old: str, new: str, name: str = "scene.plsys") -> None:
         """Replace the first ``old`` in a file."""

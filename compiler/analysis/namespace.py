@@ -1,0 +1,167 @@
+"""Which block defines, assigns and uses each name of a scene, kept up to date block by block.
+
+Blocks that come and go → entries of the compiler's namespace, and the names whose *signature* changed: what others see
+of a definition (its kind, a Selection's parameters, a constant's text).
+
+Example::
+
+    namespace.forget(old)
+    namespace.learn(new)
+    for block in namespace.refresh(): …         # uses a name that means something else now
+"""
+
+from __future__ import annotations
+
+from typing import Callable, Iterator
+
+from ..reading import syntax, vocabulary
+from ..reading.model import Definition as ModelDefinition
+from ..reading.nearest import NameIndex, nearest_of
+from ..reading.resolve_names import Entry, vocabulary_names
+from .facts import Definition, facts_of
+from .text import Block
+
+# Definitions whose value others are made of: when one changes, so may what is said about those.
+_VALUES = frozenset(("value", "input", "texture", "pigment", "finish", "color_map", "object"))
+
+_VOCABULARY = {kind: NameIndex(vocabulary_names(kind)) for kind in ("primitive", "function", "constant", "colour")}
+
+
+class _Nothing(list):
+    """A list that stays empty: the resolver's record of references, which the index has already."""
+
+    def append(self, _: object) -> None:
+        pass
+
+
+class Namespace:
+    """``position`` tells where a definition stands, so that the first of several counts."""
+
+    def __init__(self, position: Callable[[Block, Definition], tuple[int, ...]]) -> None:
+        self.definers: dict[str, dict[Block, list[Definition]]] = {}
+        self.writers: dict[str, dict[Block, list[syntax.Name]]] = {}
+        self.users: dict[str, dict[Block, None]] = {}
+        self.entries: dict[str, Entry] = {}
+        self._position = position
+        self._signatures: dict[str, object] = {}
+        self._touched: dict[str, None] = {}  # names that may mean something else since the last refresh
+        self._names: dict[str, NameIndex] = {}  # by kind, for names that are like a wrong one
+
+    # --- following blocks
+
+    def forget(self, block: Block) -> None:
+        facts = facts_of(block)
+        for definition in (*facts.definitions, *facts.ghosts.values()):
+            self._drop(self.definers, definition.name, block)
+            self._touched[definition.name] = None
+        for name in facts.assigned:
+            self._drop(self.writers, name.name, block)
+            self._touched[name.name] = None
+        for name in facts.names:
+            self._drop(self.users, name.name, block)
+
+    @staticmethod
+    def _drop(table: dict[str, dict], name: str, block: Block) -> None:
+        blocks = table.get(name)
+        if blocks is not None:
+            blocks.pop(block, None)
+            if not blocks:
+                del table[name]
+
+    def learn(self, block: Block) -> None:
+        facts = facts_of(block)
+        for definition in (*facts.definitions, *facts.ghosts.values()):
+            self.definers.setdefault(definition.name, {}).setdefault(block, []).append(definition)
+            self._touched[definition.name] = None
+        for name in facts.assigned:
+            self.writers.setdefault(name.name, {}).setdefault(block, []).append(name)
+            self._touched[name.name] = None
+        for name in facts.names:
+            self.users.setdefault(name.name, {})[block] = None
+
+    @property
+    def is_fresh(self) -> bool:
+        return not self._touched
+
+    def refresh(self) -> Iterator[Block | None]:
+        """Bring the entries up to date; the blocks that use a name whose signature changed, or a constant made of
+        those. None in between, where a pause can be made."""
+        queue = []
+        while self._touched:
+            name = next(iter(self._touched))
+            del self._touched[name]
+            if self._refresh(name):
+                queue.append(name)
+            yield None
+        seen = set(queue)
+        while queue:
+            for block in list(self.users.get(queue.pop(), ())):
+                yield block
+                for definition in facts_of(block).definitions:
+                    entry = self.renew(definition)
+                    if entry is not None and entry.kind in _VALUES and definition.name not in seen:
+                        seen.add(definition.name)
+                        queue.append(definition.name)
+
+    def _refresh(self, name: str) -> bool:
+        """Bring the entry of ``name`` up to date; whether its signature changed."""
+        node, kind = self._defining(name)
+        entry = self.entries.get(name)
+        if node is None:
+            if entry is not None:
+                self._names[entry.kind].remove(name)
+                del self.entries[name]
+        elif entry is None or entry.node is not node:
+            span = node.span if isinstance(node, syntax.Name) else node.name.span
+            definition = ModelDefinition(name, kind, span, _Nothing(), _Nothing())
+            self.entries[name] = Entry(definition, node)
+            if entry is None or entry.kind != kind:
+                if entry is not None:
+                    self._names[entry.kind].remove(name)
+                self._names.setdefault(kind, NameIndex()).add(name)
+        if node is None:
+            return self._signatures.pop(name, None) is not None
+        several = sum(map(len, self.definers.get(name, {}).values())) > 1
+        signature = (_signature(node, kind), id(node) if several else 0)
+        if self._signatures.get(name) == signature:
+            return False
+        self._signatures[name] = signature
+        return True
+
+    def _defining(self, name: str) -> tuple[syntax.Definition | syntax.Name | None, str]:
+        """The syntax of what defines ``name`` (the first, as the compiler sees it), and its kind."""
+        if vocabulary.kind_of(name):
+            return None, ""
+        found = [(block, each) for block, several in self.definers.get(name, {}).items() for each in several]
+        if found:
+            if len(found) > 1:
+                found.sort(key=lambda pair: (pair[1].name in facts_of(pair[0]).ghosts, *self._position(*pair)))
+            return found[0][1].node, found[0][1].kind
+        writers = self.writers.get(name)
+        return (next(iter(writers.values()))[0], "parameter") if writers else (None, "")
+
+    def renew(self, definition: Definition) -> Entry | None:
+        """Forget the value of the entry that ``definition`` makes; the entry, if it makes one."""
+        entry = self.entries.get(definition.name)
+        if entry is None or entry.node is not definition.node:
+            return None
+        entry.value, entry.failed = None, False
+        return entry
+
+    # --- asking
+
+    def nearest(self, name: str, kinds: tuple[str, ...] | None) -> str:
+        """As Names.nearest of the compiler."""
+        if kinds is None:
+            return nearest_of(name, list(self._names.values()))
+        tables = (self._names, _VOCABULARY)
+        return nearest_of(name, [table[kind] for kind in kinds for table in tables if kind in table])
+
+
+def _signature(node: syntax.Definition | syntax.Name, kind: str) -> object:
+    """What others see of a definition."""
+    if kind in ("calculation", "transformation", "parameter"):
+        return kind
+    if isinstance(node, syntax.Selection):
+        return kind, tuple(parameter.name for parameter in node.parameters)
+    return kind, node.span.text
