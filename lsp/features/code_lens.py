@@ -14,6 +14,8 @@ from plsys.compiler.analysis import facts_of
 from plsys.lsp.request import Feature, Request
 
 PREVIEWED = ("camera", "object")
+# In files with more definitions than this, only Selections have lenses: editors ask for all of them after each edit.
+MANY = 1000
 
 
 def code_lenses(request: Request) -> list[dict[str, Any]]:
@@ -23,8 +25,9 @@ def code_lenses(request: Request) -> list[dict[str, Any]]:
     if first is not None:
         command = {"title": "▶ Preview", "command": "plsys.preview", "arguments": [uri]}
         lenses.append({"range": request.range(*first), "command": command})
-    for each in request.document.outline():
-        if each.name and each.kind != "block":
+    named = [each for each in request.document.outline() if each.name and each.kind != "block"]
+    for each in named:
+        if len(named) <= MANY or each.kind == "selection":
             data = {"uri": uri, "name": each.name}
             lenses.append({"range": request.range(each.name_start, each.name_end), "data": data})
     return lenses

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Iterator
 
-from plsys.compiler.analysis import Document, facts_of, vocabulary
+from plsys.compiler.analysis import Document, facts_of
 from plsys.lsp.request import Feature, Request
 
 
@@ -30,10 +30,10 @@ def document_links(request: Request) -> list[dict[str, Any]]:
 def meshes(document: Document) -> Iterator[tuple[int, int, Path]]:
     """The quoted names of mesh files, and their paths."""
     folder = document.path.parent if document.path is not None else Path()
-    for root, base, block in document.trees():
-        if b"mesh" not in block.data or not any(name.name == "mesh" for name in facts_of(block).names):
+    for block, base in zip(document.text.blocks, document.text.starts):
+        if b"mesh" not in block.data:
             continue
-        for node in calls(root):
+        for node in calls(facts_of(block).tree.root_node):
             for argument in node.children_by_field_name("argument"):
                 if argument.type == "string":
                     start, end = base + argument.start_byte, base + argument.end_byte
@@ -46,7 +46,7 @@ def calls(node: Any) -> Iterator[Any]:
     """The calls of ``mesh`` below ``node``."""
     if node.type == "call":
         name = node.child_by_field_name("name")
-        if name is not None and name.text == b"mesh" and "mesh" in vocabulary.PRIMITIVES:
+        if name is not None and name.text == b"mesh":
             yield node
     for child in node.children:
         yield from calls(child)

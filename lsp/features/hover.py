@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from plsys.compiler.analysis import GuardInsight, context_at, insights_in, vocabulary
-from plsys.lsp import describe, prose
+from plsys.lsp import describe, palette, prose
 from plsys.lsp.request import Feature, Request
 
 WORDS = frozenset(b"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_")
@@ -29,6 +29,8 @@ def hover(request: Request) -> dict[str, Any] | None:
     start, end = word_at(request)
     word = request.document.text.slice(start, end).decode(errors="replace")
     text = describe_word(request, word, start)
+    if word in palette.FORMS and text:
+        text = f"{swatch_at(request, start)}{text}"
     return answer(request, text, start, end) if text else None
 
 
@@ -70,6 +72,15 @@ def describe_word(request: Request, word: str, start: int) -> str | None:
         if found is not None:
             text = f"{describe.guard(found.insight)}\n\n{text}"
     return text
+
+
+def swatch_at(request: Request, start: int) -> str:
+    """The swatch of the constant colour that begins at ``start``, if one does."""
+    block, base = request.document.text.block_at(start)
+    for first, _, parts in palette.colours_of(request.scene, block):
+        if base + first == start:
+            return describe.swatch(parts) + "\n\n"
+    return ""
 
 
 def row_of(word: str, blocks: tuple[str, ...]) -> vocabulary.Row | None:

@@ -40,3 +40,11 @@ def test_references_can_be_shown():
 
 def test_a_library_has_no_preview():
     assert lenses(Editor("Transformation T { scale 2; }\n")) == [("T", "0 references")]
+
+
+def test_a_long_file_has_lenses_on_selections_only():
+    text = "".join(f"Selection S{i} {{ S{i} -> T{i} box; }}\nTransformation T{i} {{ scale 2; }}\n" for i in range(600))
+    editor = Editor(text)
+    editor.published()
+    answer = editor.in_file("textDocument/codeLens")
+    assert len(answer) == 600 and all(each["data"]["name"].startswith("S") for each in answer)

@@ -90,7 +90,9 @@ def test_a_constant():
         ("Calculation C { a = cl<cursor>amp(1, 2, 3); }\n", "clamp(x, low, high)"),
         ("#decl<cursor>are A = 1;\n", "Names a constant"),
         ("Sele<cursor>ction A { A -> box; }\n", "Defines a symbol"),
+        ("background { color rg<cursor>b <1, 0, 0> }\n", "#ff0000"),
         ("sphere { 0, 1 pigment { color R<cursor>ed } }\n", "#ff0000"),
+        ("background { color rg<cursor>b <1, 0, 0> }\n", "#ff0000"),
         ("sphere { 0, 1 pigment { co<cursor>lor Red } }\n", "One colour for all of the surface"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tests.lsp.client import Client
 from tests.lsp.editor import Editor, offset_of
 
 TREE = """\
@@ -122,3 +123,13 @@ def test_the_editor_is_told_when_hints_have_arrived():
     Work().run(snapshot.request, lambda answer: editor.session._take(Result(snapshot, answer)))
     assert any(message.get("method") == "workspace/inlayHint/refresh" for message in editor.sent)
     assert len(hints(editor)) == 8
+
+
+def test_a_real_server_works_them_out_beside_the_editing():
+    with Client() as client:
+        client.initialize({"workspace": {"inlayHint": {"refreshSupport": True}}})
+        client.open("untitled:tree.plsys", TREE)
+        client.wait_for("workspace/inlayHint/refresh")
+        lines = {"start": {"line": 0, "character": 0}, "end": {"line": 3, "character": 0}}
+        answer = client.request("textDocument/inlayHint", {"textDocument": {"uri": "untitled:tree.plsys"}, "range": lines})
+        assert [each["label"] for each in answer["result"]] == ["2,049 cylinders · depth 13 · ×0.80–1.00 per level"]
