@@ -21,7 +21,7 @@ from plsys.compiler.reading.model import Constant
 from plsys.compiler.reading.parse import parse
 from plsys.compiler.reading.resolve import resolve
 from plsys.compiler.reading.source import Source
-from tests.random_scenes import scenes
+from random_scenes import scenes
 
 FIGURE_2_1 = """\
 object { Tree }
