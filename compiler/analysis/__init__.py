@@ -22,20 +22,23 @@ from ..reading.diagnostics import Diagnostic, PlsysError, nearest
 from ..reading.source import Span
 from .context import Context, context_at
 from . import queries
+from .actions import Action, TextEdit
 from .document import Document, Meaning, Message, Outline, Place
 from .facts import Definition, Facts, Name, facts_of
+from .fixes import fixes, ignoring
 from .format import Formatted, format_document
 from .insights import GuardInsight, Insight, SymbolInsight, ValueInsight, insights_in, insights_of
-from .motion import Motion, motion_of
+from .motion import Motion, constant_of, motion_of
 from .project import Project
+from .refactor import refactorings
 from .scene import Scene
 from .text import Block, Change, Text
 from .whole import Checker, Result
 from .whole import run as check_whole
 
 __all__ = [
-    "Block", "CODES", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Formatted",
+    "Action", "Block", "CODES", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Formatted",
     "GuardInsight", "Insight", "Meaning", "Message", "Motion", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
-    "Scene", "Span", "SymbolInsight", "Text", "ValueInsight", "check_whole", "context_at", "facts_of",
-    "format_document", "insights_in", "insights_of", "motion_of", "nearest", "queries", "syntax", "vocabulary",
+    "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "facts_of", "fixes",
+    "format_document", "ignoring", "insights_in", "insights_of", "motion_of", "nearest", "queries", "refactorings", "syntax", "vocabulary",
 ]  # fmt: skip

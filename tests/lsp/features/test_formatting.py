@@ -7,7 +7,7 @@ from tests.lsp.editor import Editor, offset_of
 
 def applied(text: str, edits: list[dict]) -> str:
     """``text`` after the protocol's edits, all in the coordinates of ``text``."""
-    for edit in sorted(edits, key=lambda each: offset_of(text, each["range"]["start"]), reverse=True):
+    for edit in reversed(sorted(edits, key=lambda each: offset_of(text, each["range"]["start"]))):
         start, end = (offset_of(text, edit["range"][side]) for side in ("start", "end"))
         text = text[:start] + edit["newText"] + text[end:]
     return text

@@ -1,0 +1,59 @@
+"""Quick fixes: a diagnostic → what to do about it, by its code.
+
+:data:`FIXES` is the registry. A row is a pattern that the message (or its hint) has, and a function that makes the
+action; one code may have several. What every message with a certain hint gets ("did you mean …?", "remove it") stands
+in :data:`BY_HINT`.
+
+Example: ``fixes(scene, document, message)`` of "missing ';' after this rule" is ``[Action("Add ';'", …)]``.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Callable, Iterator
+
+from ..reading.codes import CODES
+from .actions import Action, Spot, TextEdit
+from .document import Document, Message
+from .fixes_scene import SCENE_FIXES
+from .fixes_text import HINT_FIXES, TEXT_FIXES
+from .scene import Scene
+
+Found = tuple[str, list[TextEdit]] | None
+Fix = Callable[[Spot, re.Match, Message], Found]
+
+FIXES: dict[str, tuple[tuple[str, Fix], ...]] = {
+    code: (*TEXT_FIXES.get(code, ()), *SCENE_FIXES.get(code, ())) for code in {**TEXT_FIXES, **SCENE_FIXES}
+}
+BY_HINT = HINT_FIXES  # the first, the nearest name, comes before what a code has
+
+
+def fixes(scene: Scene, document: Document, message: Message) -> Iterator[Action]:
+    """The quick fixes of a message; the first one is the likeliest."""
+    spot = Spot(scene, document, message.start, message.end)
+    found = message.diagnostic
+    preferred = True
+    seen: set[tuple] = set()
+    sources = [(found.hint, BY_HINT[:1]), (found.message, FIXES.get(found.code, ())), (found.hint, BY_HINT[1:])]
+    for text, rows in sources:
+        for pattern, fix in rows:
+            match = re.search(pattern, text)
+            made = fix(spot, match, message) if match else None
+            if made is None or not made[1] or tuple(made[1]) in seen:
+                continue
+            seen.add(tuple(made[1]))
+            yield Action(made[0], "quickfix", tuple(made[1]), preferred, message)
+            preferred = False
+
+
+def ignoring(scene: Scene, document: Document, message: Message) -> Iterator[Action]:
+    """The action that silences a warning or info by a comment in the line before."""
+    code = message.diagnostic.code
+    if CODES[code].severity == "error" or code == "ignore":
+        return
+    text = document.text
+    line = text.line_of(message.start)
+    start, written = text.line_start(line), text.line_bytes(line)
+    indent = written[: len(written) - len(written.lstrip(b" \t"))].decode()
+    edit = TextEdit(document, start, start, f"{indent}// plsys-ignore: {code}\n")
+    yield Action(f"Ignore '{code}' in this line", "quickfix", (edit,), False, message)

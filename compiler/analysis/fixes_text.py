@@ -1,0 +1,192 @@
+"""Quick fixes of how a scene is written: what is missing, too much, or a habit from another language.
+
+Each takes the spot of the message, the match of the row's pattern, and the message; it gives a title and edits, or None.
+"""
+
+from __future__ import annotations
+
+import re
+
+from .actions import Spot, TextEdit
+from .document import Message
+
+Found = tuple[str, list[TextEdit]] | None
+
+_CLOSER = {"{": "}", "(": ")", "[": "]", "<": ">"}
+
+
+def insert(text: str, title: str = ""):
+    """A fix that puts ``text`` at the start of the spot."""
+
+    def fix(spot: Spot, match: re.Match, message: Message) -> Found:
+        return title or f"Add '{text.strip()}'", [spot.edit(spot.start, spot.start, text)]
+
+    return fix
+
+
+def replace(text: str):
+    """A fix that puts ``text`` (with groups of the match) in the place of the spot."""
+
+    def fix(spot: Spot, match: re.Match, message: Message) -> Found:
+        new = match.expand(text)
+        return f"Replace by '{new}'", [spot.replace(new)]
+
+    return fix
+
+
+def remove(spot: Spot, match: re.Match, message: Message) -> Found:
+    if spot.start == spot.end:
+        return None
+    return f"Remove '{_short(spot.text)}'", [spot.cut(spot.start, spot.end)]
+
+
+def write_hint(spot: Spot, match: re.Match, message: Message) -> Found:
+    """Replace the spot by what the hint says to write."""
+    written = re.search(r"\bwrite (.+)$", message.diagnostic.hint)
+    if written is None or "…" in written[1]:
+        return None
+    return f"Write '{_short(written[1])}'", [spot.replace(written[1])]
+
+
+def suggestion(spot: Spot, match: re.Match, message: Message) -> Found:
+    """"did you mean 'Tree'?": replace the last word of the spot that isn't it."""
+    if spot.start == spot.end or "\n" in spot.text:
+        return None
+    return f"Replace by '{match[1]}'", [spot.replace(match[1])]
+
+
+def in_brackets(spot: Spot, match: re.Match, message: Message) -> Found:
+    return "Put it in brackets", [spot.edit(spot.start, spot.start, "("), spot.edit(spot.end, spot.end, ")")]
+
+
+def close(spot: Spot, match: re.Match, message: Message) -> Found:
+    """Put the closer of a bracket where what it holds ends."""
+    opener = spot.text
+    node, base = spot.document.node_at(spot.start)
+    if opener == "{":
+        block = spot.document.text.block_at(spot.start)[0]
+        code = block.data[: _code_end(block.data)]
+        end = base + len(code)
+        on_own_line = "\n" in spot.slice(spot.start, end)
+        return "Add '}'", [spot.edit(end, end, "\n}" if on_own_line else " }")]
+    parent = node.parent
+    if opener not in _CLOSER or parent is None or parent.type in ("ERROR", "source_file"):
+        return None
+    end = base + parent.end_byte
+    return f"Add '{_CLOSER[opener]}'", [spot.edit(end, end, _CLOSER[opener])]
+
+
+def close_string(spot: Spot, match: re.Match, message: Message) -> Found:
+    return "Add '\"'", [spot.edit(spot.end, spot.end, '"')]
+
+
+def close_comment(spot: Spot, match: re.Match, message: Message) -> Found:
+    text = spot.document.text
+    end = text.line_start(text.line_of(spot.start)) + len(text.line_bytes(text.line_of(spot.start)))
+    return "Add '*/' at the line's end", [spot.edit(end, end, " */")]
+
+
+def without_braces(spot: Spot, match: re.Match, message: Message) -> Found:
+    node, base = spot.document.node_at(spot.start)
+    parent = node.parent
+    if parent is None or parent.children[-1].type != "}":
+        return None
+    closer = parent.children[-1]
+    return "Remove the braces", [spot.cut(spot.start, spot.end), spot.cut(base + closer.start_byte, base + closer.end_byte)]
+
+
+def angle_brackets(spot: Spot, match: re.Match, message: Message) -> Found:
+    node, base = spot.document.node_at(spot.start)
+    closer = node.parent.children[-1]
+    if closer.type != ")":
+        return None
+    return "Write it as a vector <…>", [spot.replace("<"), spot.edit(base + closer.start_byte, base + closer.end_byte, ">")]
+
+
+def touching_product(spot: Spot, match: re.Match, message: Message) -> Found:
+    return f"Write {match[1]}*{match[2]}", [spot.replace(f"{match[1]}*{match[2]}")]
+
+
+def touching_values(spot: Spot, match: re.Match, message: Message) -> Found:
+    return f"Write {match[1]} {match[2]}", [spot.replace(f"{match[1]} {match[2]}")]
+
+
+def without_call_brackets(spot: Spot, match: re.Match, message: Message) -> Found:
+    name, _, arguments = spot.text.partition("(")
+    written = f"{name} {arguments.rstrip().removesuffix(')')}".rstrip()
+    return f"Write '{_short(written)}'", [spot.replace(written)]
+
+
+def closed_up_call(spot: Spot, match: re.Match, message: Message) -> Found:
+    return "Remove the space", [spot.replace(re.sub(r"\s", "", spot.text))]
+
+
+def add_body(spot: Spot, match: re.Match, message: Message) -> Found:
+    body = re.search(r"\{.*\}$", message.diagnostic.hint)
+    if body is None:
+        return None
+    text = body[0].replace("Name -> …;", f"{match[1]} -> ;")
+    return "Add a body", [spot.edit(spot.start, spot.start, f" {text}")]
+
+
+def add_value(spot: Spot, match: re.Match, message: Message) -> Found:
+    code = spot.text.rstrip().rstrip(";").rstrip("= \t")
+    return "Give it the value 1", [spot.replace(f"{code} = 1;")]
+
+
+def _code_end(data: bytes) -> int:
+    """Where the last token ends that is no comment."""
+    tokens = re.finditer(rb'//[^\r\n]*|/\*.*?(?:\*/|\Z)|"(?:[^"\\\r\n]|\\.)*"?|\S', data, re.DOTALL)
+    return max((match.end() for match in tokens if match[0][:2] not in (b"//", b"/*")), default=0)
+
+
+def _short(text: str) -> str:
+    line = text.split("\n")[0]
+    return line if line == text and len(line) <= 40 else line[:37] + "…"
+
+
+_WRITE = r"^.*(?:lacks a digit|is no operator|this dash|quotation mark|takes no arguments|ends with its Selection's name|left side takes)"
+
+TEXT_FIXES = {
+    "syntax": (
+        (r"stands where a rule has '->'", replace("->")),
+        (r"stands where a range has 'to'", replace(" to ")),
+        (r"is written as two words", replace("else if")),
+        (r"a condition stands in brackets", in_brackets),
+        (r"braces don't surround rules|statements in a \w+ don't nest", without_braces),
+        (r"a vector stands in angle brackets", angle_brackets),
+        (r"the number (\S+) touches the name (\w+)", touching_product),
+        (r"the number (\S+) touches the name (\w+)", touching_values),
+        (r"operation's arguments stand without brackets", without_call_brackets),
+        (r"a space stands between a function and its bracket", closed_up_call),
+        (r"this alternative has no weight", insert("1: ")),
+        (r"nothing stands after this '\+'|an alternative is missing after this", remove),
+        (r"'\^' is no operator", lambda *_: None),
+        (_WRITE, write_hint),
+    ),
+    "missing": (
+        (r"^missing ';'", insert(";")),
+        (r"^missing '->'", insert(" ->")),
+        (r"^missing '='", insert(" =")),
+        (r"^\w+ (\w+) has no body", add_body),
+        (r"^(?:Parameter|#declare) \w+ has no value", add_value),
+    ),
+    "assignment-in-condition": ((r"", replace("==")),),
+    "unclosed": (
+        (r"this '[{(\[<]' is never closed", close),
+        (r"this string is never closed", close_string),
+        (r"this comment is never closed", close_comment),
+    ),
+    "encoding": ((r"NUL byte|not UTF-8", remove),),
+    "wrong-arguments": (
+        (r"this alternative has no weight", insert("1: ")),
+        (_WRITE, write_hint),
+    ),
+    "unsupported": ((r"^#local isn't", replace("#declare")),),
+}
+
+HINT_FIXES = (
+    (r"did you mean '([^']+)'", suggestion),
+    (r"^remove (?:it|them)(?:$|[,;:])", remove),
+    (r"or remove the '\+'", remove),
+)
