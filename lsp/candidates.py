@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from typing import Iterable, Iterator, NamedTuple
 
-from plsys.compiler.analysis import Context, Document, Scene, facts_of, syntax, vocabulary
+from plsys.compiler.analysis import Context, Document, Scene, facts_of, insights_of, syntax, vocabulary
 
 from . import prose, snippets
 
@@ -98,6 +98,8 @@ def detailed(scene: Scene, each: Candidate) -> Candidate:
         return each._replace(detail=f"Selection {each.name}({', '.join(names)})", snippet=call)
     if isinstance(node, syntax.ParameterDeclaration | syntax.Declare):
         return each._replace(detail=_short(node.span.text))
+    if each.kind == "parameter":
+        return each._replace(detail=prose.parameter(insights_of(scene, each.name)))
     return each._replace(detail=prose.KINDS.get(each.kind, each.kind))
 
 

@@ -106,14 +106,10 @@ def declared_input(node: syntax.ParameterDeclaration) -> str:
 
 
 def parameter(scene: Scene, meaning: Meaning) -> str:
-    """Where it is assigned, and between which values."""
-    found = [each for each in insights_of(scene, meaning.name) if isinstance(each, ValueInsight)]
+    """Between which values it is, and where it is assigned."""
     count = len(meaning.definitions)
-    parts = [f"assigned in {count} place{'s' if count != 1 else ''}"]
-    if found:
-        low, high = min(each.low for each in found), max(each.high for each in found)
-        parts.append(f"from {prose.number(low)} to {prose.number(high)}" if low != high else f"always {prose.number(low)}")
-    return "parameter, " + ", ".join(parts)
+    values = prose.parameter(insights_of(scene, meaning.name))
+    return f"{values}; assigned in {count} place{'s' if count != 1 else ''}"
 
 
 # --- transformations

@@ -11,8 +11,9 @@ Example::
 from __future__ import annotations
 
 import math
+from typing import Iterable
 
-from plsys.compiler.analysis import GuardInsight, SymbolInsight, ValueInsight, vocabulary
+from plsys.compiler.analysis import GuardInsight, Insight, SymbolInsight, ValueInsight, vocabulary
 
 Row = vocabulary.Row
 PLURALS = {"box": "boxes", "torus": "tori", "mesh": "meshes"}
@@ -142,6 +143,15 @@ def values(found: ValueInsight) -> str:
     if found.certain and first != last:
         return f"{first} → {last}"
     return f"{low} … {high}"
+
+
+def parameter(found: Iterable[Insight]) -> str:
+    """``parameter, from 20 to 60``: of the values that are known of it."""
+    known = [each for each in found if isinstance(each, ValueInsight)]
+    if not known:
+        return "parameter"
+    low, high = min(each.low for each in known), max(each.high for each in known)
+    return f"parameter, from {number(low)} to {number(high)}" if low != high else f"parameter, always {number(low)}"
 
 
 # --- the vocabulary

@@ -66,12 +66,13 @@ def completion(request: Request) -> dict[str, Any]:
 
 def item(each: Candidate, order: int, range_: dict, snippets: bool, uri: str) -> dict[str, Any]:
     """The protocol's CompletionItem."""
+    row = {"row": f"{each.row.kind}.{each.row.name}", "block": each.row.block} if each.row is not None else {}
     found: dict[str, Any] = {
         "label": each.name,
         "kind": KINDS.get(each.kind, 1),
         "sortText": f"{order:04d}",
         "filterText": each.name,
-        "data": {"uri": uri, "name": each.name, "row": each.row.kind + "." + each.row.name if each.row else "", "block": each.row.block if each.row else ""},
+        "data": {"uri": uri, "name": each.name, **row},
     }
     if each.detail:
         found["detail"] = each.detail

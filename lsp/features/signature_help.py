@@ -13,6 +13,11 @@ from plsys.compiler.analysis import Context, Scene, context_at, syntax, vocabula
 from plsys.lsp import prose
 from plsys.lsp.request import Feature, Request
 
+# What stands in the innermost block so far; vectors, also half-typed; and calls and constants in values.
+_OPENED = re.compile(rb"\{([^{}]*)$")
+_VECTOR = re.compile(rb"<[^<>]*>?")
+_CALLS = re.compile(rb"\b[A-Za-z_]\w*\s*(?=\()|\b(?:[xyz]|pi)\b")
+_LETTER = re.compile(rb"[A-Za-z_]\w*\s+[^\s,*/+-]")
 _WORD = re.compile(r"[A-Za-z_]\w*")
 
 
@@ -27,7 +32,24 @@ def signature_help(request: Request) -> dict[str, Any] | None:
         row = vocabulary.OPERATIONS[context.function]
         forms = row.signature.split("   or   ")
         return operation_signature(row, forms, context.argument)
+    if context.kind == "block" and context.blocks:
+        return block_signature(request, context.blocks[-1])
     return None
+
+
+def block_signature(request: Request, name: str) -> dict[str, Any] | None:
+    """The values that a shape's block begins with: ``sphere { centre, radius ... }``."""
+    row = vocabulary.BLOCKS.get(name)
+    if row is None or not row.types:
+        return None
+    block, base = request.document.text.block_at(max(0, request.offset - 1))
+    match = _OPENED.search(block.data[: request.offset - base])
+    if match is None or _LETTER.search(_CALLS.sub(b"", match[1])):
+        return None  # a property or a modifier has begun
+    commas = _VECTOR.sub(b"", match[1]).count(b",")
+    found = signature(row, row.signature)
+    found["parameters"] = found["parameters"][: len(row.types)]
+    return answer([found], 0, commas) if commas < len(row.types) else None
 
 
 def operation_signature(row: vocabulary.Row, forms: list[str], argument: int) -> dict[str, Any]:

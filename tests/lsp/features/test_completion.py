@@ -142,6 +142,16 @@ def test_documentation_is_resolved_lazily():
     assert "Age" in editor.request("completionItem/resolve", item)["documentation"]["value"]
 
 
+def test_parameters_have_their_values():
+    text = "object { A }\nSelection A { C_a A; if (n > 0) A -> box + [ --n; rotz <cursor> ] A; }\nCalculation C_a { n = 3; }\n"
+    editor = Editor(text.replace("<cursor>", "0"))
+    editor.check_whole()
+    position = {"line": 1, "character": text.split("\n")[1].index("<cursor>")}
+    editor.change("rotz 0", "rotz ")
+    answer = editor.in_file("textDocument/completion", position=position)["items"]
+    assert next(each["detail"] for each in answer if each["label"] == "n") == "parameter, always 3"
+
+
 def test_file_paths(tmp_path):
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "leaf.obj").write_text("")

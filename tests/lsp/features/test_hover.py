@@ -67,7 +67,7 @@ def test_a_calculation_says_what_it_assigns():
 
 def test_a_parameter():
     text = hovered(at(TREE, "roty beta"))
-    assert "assigned in 2 places, from 20 to 60" in text and "betaBr -= 4.0" in text
+    assert "parameter, from 20 to 60; assigned in 2 places" in text and "betaBr -= 4.0" in text
 
 
 def test_an_input():
