@@ -91,3 +91,9 @@ def test_a_closing_brace_joins_what_an_open_one_held_apart():
     assert len(text.blocks) > 1
     text.replace(len(text) - 12, len(text) - 11, b"}\n")
     assert [block.data for block in text.blocks] == [b"union {\nbox { }\nsphere { }\n}\n", b"camera { }\n"]
+
+
+def test_a_comment_that_swallows_a_block_joins_the_one_after_it():
+    text = Text("x", None, b"\nunion {\nbox { }\n}\n/**/\ncamera {\n angle 45 }\n")
+    text.replace(0, 0, "\ufeff/*".encode())
+    assert [block.data for block in text.blocks] == [block.data for block in Text("x", None, text.data).blocks]
