@@ -1,6 +1,6 @@
 """Starts programs for the bench and measures them: JSON requests on standard input, a JSON answer a line.
 
-    {"command": ["povray", …], "stdin": "/…", "stdout": "/…", "folder": null} → {"status": 0, "wall": 1.2, "cpu": 1.1, "rss": 17000000}
+    {"command": ["povray", …], "stdin": "/…", "stdout": "/…", "stderr": "/…", "folder": null} → {"status": 0, "wall": 1.2, "cpu": 1.1, "rss": 17000000}
 
 A process's peak memory as the kernel counts it begins with that of the process that started it, so whoever has imported
 NumPy can't measure small programs. This process imports next to nothing.
@@ -20,7 +20,7 @@ def launch(request: dict) -> dict:
         try:
             os.dup2(os.open(request["stdin"] or os.devnull, os.O_RDONLY), 0)
             os.dup2(os.open(request["stdout"], flags, 0o600), 1)
-            os.dup2(1, 2)
+            os.dup2(os.open(request["stderr"], flags, 0o600), 2)
             if request["folder"]:
                 os.chdir(request["folder"])
             os.execvp(request["command"][0], request["command"])

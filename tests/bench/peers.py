@@ -30,12 +30,13 @@ PINNED = ("taskset", "-c", str(max(os.sched_getaffinity(0))))
 
 @dataclass
 class Run:
-    """wall, cpu: seconds · rss: peak bytes · text: what it printed."""
+    """wall, cpu: seconds · rss: peak bytes · text, errors: what it printed."""
 
     wall: float
     cpu: float
     rss: int
     text: str
+    errors: str
 
 
 @cache
@@ -48,22 +49,23 @@ def run(command: list, request: object = None, pinned: bool = True, folder: Path
     """Runs a program to its end. RuntimeError with its last words if it fails."""
     prefix = PINNED if pinned and shutil.which("taskset") else ()
     with tempfile.TemporaryDirectory() as place:
-        given, said = Path(place) / "in", Path(place) / "out"
+        given, said, complained = (Path(place) / name for name in ("in", "out", "err"))
         given.write_text("" if request is None else json.dumps(request))
         order = {
             "command": [*prefix, *map(str, command)],
             "stdin": str(given),
             "stdout": str(said),
+            "stderr": str(complained),
             "folder": folder and str(folder),
         }
         print(json.dumps(order), file=launcher().stdin, flush=True)
         answer = json.loads(launcher().stdout.readline())
-        text = said.read_text(errors="replace")
+        text, errors = (path.read_text(errors="replace") for path in (said, complained))
     if answer["status"]:
         raise RuntimeError(
-            f"{Path(order['command'][len(prefix)]).name} failed ({answer['status']}): {text[-600:]}"
+            f"{Path(order['command'][len(prefix)]).name} failed ({answer['status']}): {(text + errors)[-600:]}"
         )
-    return Run(answer["wall"], answer["cpu"], answer["rss"], text)
+    return Run(answer["wall"], answer["cpu"], answer["rss"], text, errors)
 
 
 def plsys(*arguments: object, pinned: bool = False) -> Run:
@@ -158,6 +160,6 @@ def povray(case, folder: Path, width: int = 640, height: int = 480, threads: int
     done = run([*command, *([f"+WT{threads}"] if threads else [])], pinned=threads == 1)
     seconds = {
         name.lower(): float(value)
-        for name, value in re.findall(r"(Parse|Trace) Time:.*?\(([\d.]+) seconds\)", done.text)
+        for name, value in re.findall(r"(Parse|Trace) Time:.*?\(([\d.]+) seconds\)", done.text + done.errors)
     }
     return seconds | {"wall": done.wall, "cpu": done.cpu, "rss": done.rss, "file_bytes": scene.stat().st_size}
