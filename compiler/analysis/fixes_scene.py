@@ -25,10 +25,13 @@ _OTHER_WAY = {"++": "--", "--": "++", "+=": "-=", "-=": "+="}
 
 def remove_definition(spot: Spot, match: re.Match, message: Message) -> Found:
     node = spot.definition
-    if node is None or not node.span.start <= spot.start - spot.base <= node.name.span.end:
+    if node is None:
         return None
-    what = getattr(node.name, "name", "this")
-    return f"Remove '{what}'", [spot.cut(spot.base + node.span.start, spot.base + node.span.end)]
+    head = node.path if isinstance(node, syntax.Include) else node.name
+    if not node.span.start <= spot.start - spot.base <= head.span.end:
+        return None
+    what = "this #include" if isinstance(node, syntax.Include) else f"'{node.name.name}'"
+    return f"Remove {what}", [spot.cut(spot.base + node.span.start, spot.base + node.span.end)]
 
 
 def remove_rule(spot: Spot, match: re.Match, message: Message) -> Found:

@@ -53,6 +53,7 @@ FIXTURES = [
     ("wrong-order", "camera { look_at 0 location <0, -9, 0> angle 45 }", "camera { location <0, -9, 0> look_at 0 angle 45 }"),
     ("unsupported", "global_settings { assumed_gamma 2.2 }", "global_settings { assumed_gamma 1.0 }"),
     ("unsupported", "sphere { 0, 1 hollow }", "sphere { 0, 1 }"),
+    ("include", '#include "colors.inc"\nsphere { 0, 1 }\n', "sphere { 0, 1 }\n"),
     # values
     ("degenerate", "sphere { 0, 1 scale <1, 0, 1> }", "sphere { 0, 1 scale <1, 1, 1> }"),
     ("colour-range", "background { color rgb <135, 206, 235> }", "background { color rgb <135/255, 206/255, 235/255> }"),

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import random
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_scenes import scenes
 
+from plsys.compiler.analysis import refactorings
 from plsys.compiler.export.unfold import unfold
 from plsys.compiler.pipeline import build
 from plsys.compiler.reading.source import Source
-from tests.compiler.analysis.edits import messages, refactored
+from tests.compiler.analysis.edits import applied, messages, opened, refactored
 
 HEAD = "camera { location <0, -9, 0> sky <0, 0, 1> look_at <0, 0, 0> }\nlight_source { <2, -3, 4> color rgb 1 }\n"
 
@@ -161,3 +167,23 @@ def test_other_entry_actions_stay(entry):
 
 def test_broken_blocks_are_left_alone():
     assert refactored("Selection <cursor>A { [ n = 3 ] A; A -> box + [ --n A; }\n") == {}
+
+
+# --- random scenes
+
+
+@settings(max_examples=25, deadline=None)
+@given(scenes(), st.integers(0, 2**32))
+def test_random_scenes_keep_their_derivation(text, seed):
+    """Every refactoring but *bound* at a random place leaves all primitives where they were."""
+    scene, document = opened(text)
+    chance = random.Random(seed)
+    expected = None
+    for _ in range(6):
+        at = chance.randrange(len(text))
+        for action in refactorings(scene, document, at, at):
+            if action.title.startswith("Bound"):
+                continue
+            expected = expected or derivation(text)
+            kinds, matrices = derivation(applied(text, action))
+            assert kinds == expected[0] and np.array_equal(matrices, expected[1]), action.title

@@ -136,7 +136,7 @@ def test_signs_keep_their_meaning(arguments, separator):
 
 @pytest.mark.parametrize("case", CASES, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_golden_scenes_keep_their_meaning(case):
-    text = case.read_text().partition("----\n")[0]
+    text = case.read_text(errors="replace").partition("----\n")[0]
     result = formatted(text)
     assert formatted(result) == result
     assert meaning(result) == meaning(text)
