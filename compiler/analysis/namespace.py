@@ -163,5 +163,5 @@ def _signature(node: syntax.Definition | syntax.Name, kind: str) -> object:
     if kind in ("calculation", "transformation", "parameter"):
         return kind
     if isinstance(node, syntax.Selection):
-        return kind, tuple(parameter.name for parameter in node.parameters)
+        return kind, tuple(parameter.name for parameter in node.parameters), node.is_whole
     return kind, node.span.text

@@ -48,6 +48,7 @@ class Scene:
         self.entries, self.definers, self.writers, self.users = names.entries, names.definers, names.writers, names.users
         self.singles: dict[str, dict[Block, None]] = {name: {} for name in _SINGLE}
         self.whole: dict[Block, list[Diagnostic]] = {}  # messages of the whole-file checks
+        self.general: dict[Block, list[Diagnostic]] = {}  # those about what parts of the scene share
         self.forecast: dict | None = None  # their forecast, of the last text without errors
         self.insights: dict[Block, list] = {}  # what they found to show beside the text: see insights.py
         self.is_opening = False  # names aren't known yet: much of a file was never read
@@ -125,7 +126,7 @@ class Scene:
             yield
 
     def _forget(self, block: Block) -> None:
-        for table in (self._messages, self._syntax, self.whole, self._edited, self._dirty, self._ignoring):
+        for table in (self._messages, self._syntax, self.whole, self.general, self.insights, self._edited, self._dirty, self._ignoring):
             table.pop(block, None)
         self._names.forget(block)
         for single in self.singles.values():
@@ -229,12 +230,14 @@ class Scene:
     def messages(self, document: Document) -> list[Message]:
         """All messages about ``document``, in text order."""
         order, found = document.text.order, []
-        tables = (self._syntax, self._include_messages, self._messages, self.whole)
+        tables = (self._syntax, self._include_messages, self._messages, self.whole, self.general)
         noisy = {block for table in tables for block in table}
         for index, block in sorted((order[block], block) for block in noisy if block in order):
             base = document.text.starts[index]
             for table in tables:
                 found += [Message(d, base + d.span.start, base + d.span.end) for d in table.get(block, ())]
+        # Resolving by block and the whole-file checks both look for missing files.
+        found = list({(m.start, m.diagnostic.code, m.diagnostic.message): m for m in found}.values())
         found += self._second_ones(document)
         ignored = self._ignores(document)
         kept = [m for m in found if not is_ignored(m.diagnostic.code, m.diagnostic.severity, m.start, ignored)]

@@ -43,9 +43,14 @@ def language() -> Language:
 
 
 def syntax_tree(data: bytes, old: Tree | None = None) -> Tree:
-    """The syntax tree of ``data``. ``old``, the tree of an earlier text with ``Tree.edit`` applied for every
-    change since, lets the parser read again only what changed."""
+    """The syntax tree of ``data``, the same whether ``old`` is given or not. ``old``, the tree of an earlier text with
+    ``Tree.edit`` applied for every change since, lets the parser read again only what changed."""
     from tree_sitter import Parser
 
     parser = Parser(language())
-    return parser.parse(data, old) if old is not None else parser.parse(data)
+    if old is not None:
+        tree = parser.parse(data, old)
+        if not tree.root_node.has_error:
+            return tree
+        # How tree-sitter gets over an error depends on what it could reuse: what is said must not.
+    return parser.parse(data)

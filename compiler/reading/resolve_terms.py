@@ -161,7 +161,7 @@ class Terms:
         if not owner or owner not in self.reached(name):
             for operator in reversed(self.entry_action(node)):
                 operand = Prefixed(operator, operand, span)
-        if len(arguments) != len(node.parameters):
+        if len(arguments) != len(node.parameters) and node.is_whole:
             wanted = ", ".join(parameter.name for parameter in node.parameters)
             counted = f"{len(node.parameters)} argument{'s' * (len(node.parameters) != 1)}"
             message = f"{name} takes {counted if node.parameters else 'no arguments'}, not {len(arguments)}"

@@ -215,12 +215,14 @@ class ParameterDeclaration(Node):
 @dataclass(frozen=True, slots=True)
 class Selection(Node):
     """``Name(parameters) { entry; productions }``. ``entry`` is the term of the entry action,
-    ``C_initialize Tree``: Calculations and last the Selection's own name."""
+    ``C_initialize Tree``: Calculations and last the Selection's own name. Where a header breaks off, not ``is_whole``,
+    parameters may be missing."""
 
     name: Name
     parameters: tuple[Name, ...]
     entry: Term | None
     productions: tuple[Production, ...]
+    is_whole: bool = True
 
 
 @dataclass(frozen=True, slots=True)
