@@ -207,6 +207,23 @@ static bool put(filling *f, const pl_box *box, const uint64_t *words, size_t wor
     return true;
 }
 
+/* Whether all voxels that a box overlaps refer to junctions of the current path: these contain what the box holds. */
+static bool is_covered(filling *f, const pl_box *box)
+{
+    uint32_t first[3], last[3];
+    if (pl_box_is_empty(box)) return true;
+    for (int axis = 0; axis < 3; axis++) voxel_range(f->grid, box, axis, &first[axis], &last[axis]);
+    for (uint32_t z = first[2]; z <= last[2]; z++)
+        for (uint32_t y = first[1]; y <= last[1]; y++)
+            for (uint32_t x = first[0]; x <= last[0]; x++) {
+                uint32_t state = f->voxels[((size_t)z * f->grid->size[1] + y) * f->grid->size[0] + x];
+                if (state == PL_GRID_NOTHING || f->walk.at.marks[1] == 0) return false;
+                uint64_t time = ((draft *)f->states.data)[state].time;
+                if (junction_with(f, f->walk.at.marks[1], time)->time != time) return false;
+            }
+    return true;
+}
+
 /* --- the walk --- */
 
 static bool is_small(const pl_grid *grid, const pl_box *box)
@@ -221,6 +238,10 @@ static bool reach_symbol(filling *f)
 {
     pl_walk *walk = &f->walk;
     pl_box box = box_in_world(f, walk->node, walk->at.payload);
+    if (is_covered(f, &box)) {
+        pl_walk_prune(walk);
+        return true;
+    }
     if (!is_small(f->grid, &box) && walk->at.depth < f->depth_limit) return true;
     size_t words = pl_scope_words(walk->program, &walk->scope), before = f->scopes.count;
     uint64_t *packed = extend(f, &f->scopes, words);

@@ -53,7 +53,7 @@ int main(int argc, char **argv)
         for (int bit = 0; bit < 8; bit++) {
             bytes[i] ^= (uint8_t)(1 << bit);
             seal(bytes, length);
-            bool alive = survives(bytes, length, bit % 2 ? PL_BVH : PL_BOXES);
+            bool alive = survives(bytes, length, bit % 3 == 0 ? PL_BOXES : bit % 3 == 1 ? PL_BVH : PL_GRID);
             traced += alive;
             refused += !alive;
             bytes[i] ^= (uint8_t)(1 << bit);
