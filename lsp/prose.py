@@ -105,7 +105,9 @@ def scale(found: SymbolInsight) -> str:
 
 
 def _factor(value: float) -> str:
-    return f"{value:.2f}" if 0.01 <= value < 10 else f"{value:.3g}"
+    """Three digits, and two places at least: ``0.80``, ``0.985``."""
+    short = f"{value:.3g}"
+    return f"{value:.2f}" if len(short) < 4 and 0.01 <= value < 10 else short
 
 
 def forecast(found: SymbolInsight) -> str:

@@ -15,6 +15,7 @@ from plsys.compiler.analysis import GuardInsight, SymbolInsight, Text, ValueInsi
 from plsys.lsp import prose
 from plsys.lsp.request import Feature, Request
 
+_NAME = re.compile(rb"[A-Za-z_]\w*")
 _CLOSING = re.compile(rb"\s*\)")
 _PARAMETERS = re.compile(rb"\s*\([^(){}]*\)")
 # How far behind a name or a guard its brackets are looked for.
@@ -25,9 +26,15 @@ def inlay_hints(request: Request) -> list[dict[str, Any]]:
     start, end = request.offsets
     text = request.document.text
     hints = []
+    told: set[tuple[int, bytes, str]] = set()
     for first, last, insight in insights_in(request.scene, request.document, start, end):
         label, tooltip = described(insight)
-        if label:
+        written = text.slice(first, last)
+        if isinstance(insight, ValueInsight) and insight.kind == "assign" and _NAME.fullmatch(written):
+            continue  # an argument that is handed on says nothing new
+        key = (text.line_of(first), written, label)
+        if label and key not in told:  # `scale a a 1` needs one hint for a
+            told.add(key)
             position = request.positions.position(hint_offset(text, first, last, insight))
             hint = {"position": position, "label": label, "paddingLeft": True, "tooltip": tooltip}
             hints.append(hint)

@@ -102,6 +102,17 @@ def test_parameters_of_a_symbol_come_before_its_hint():
     ]
 
 
+def test_the_same_is_said_once_a_line():
+    editor = checked(
+        "object { A(3, 1) }\nSelection A(n, w) { if (n > 0) A -> [ scale n/3 n/3 1 ] box + [ trans 1 0 0; scale 0.985 ] A(n - 1, w/2); }\n"
+        "object { B(2, 8) }\nSelection B(m, v) { if (m > 0) B -> [ scale v ] box + B(m - 1, v) + [ v /= 2 ] B(m - 1, v); }\n"
+    )
+    found = hints(editor)
+    assert found[0] == "Selection A(n, w) [3 boxes · depth 4 · ×0.985 per level]"
+    assert [each for each in found if "[1 → 0.3333]" in each] == ["Selection A(n, w) { if (n > 0) A -> [ scale n/3 [1 → 0.3333]"]
+    assert not any(each.rpartition(" [")[0].endswith("m - 1, v") for each in found)
+
+
 def test_an_included_file_has_its_hints(tmp_path):
     files = {
         "main.plsys": '#include "lib.plsys"\nobject { Row }\nCalculation C_start { n = 3; }\n',
