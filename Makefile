@@ -12,14 +12,19 @@ SOURCES := pyproject.toml CMakeLists.txt README.md LICENSE grammar/src/parser.c 
 RUNTIME_C := $(wildcard runtime/*.c runtime/shapes/*.c runtime/accel/*.c)
 CFLAGS_DEV := -std=gnu11 -O2 -g -Wall -Wextra -Werror -ffp-contract=off -fno-math-errno -fPIC -fvisibility=hidden -Iruntime -Iruntime/include
 
-.PHONY: render test help dev generate bench bench-lsp check-generated bless sanitize wheel clean
+.PHONY: render test stress help dev generate bench bench-lsp check-generated bless sanitize wheel clean
 
 render: .venv/.installed ## draw SCENE to OUT
 	$(BIN)/plsys render $(SCENE) -o $(OUT)
 
 test: .venv/.tests ## run all tests
 	sh tests/install_povray.sh
+	sh tests/editors/install.sh $(BIN)/python
 	$(BIN)/python -m pytest tests
+
+stress: .venv/.tests ## the tests that try at random, for hours: 10^6 edits, 10^5 messages, scenes typed by the character
+	PLSYS_STRESS=1 $(BIN)/python -m pytest tests/grammar/test_incremental.py tests/compiler/test_mutated.py \
+	  tests/lsp/test_editing.py tests/lsp/test_hostile.py
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1 \t\2/p' Makefile | expand -t 24
