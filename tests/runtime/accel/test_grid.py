@@ -123,3 +123,17 @@ def test_more_voxels_take_more_memory_and_fewer_tests():
     memory, tests = zip(*costs)
     assert memory[0] <= memory[1] < memory[2]
     assert tests[0] > 1.5 * tests[1] > 3 * tests[2]
+
+
+def test_the_command_line_takes_a_size(tmp_path, capsys):
+    from plsys.compiler.cli import main
+
+    scene = tmp_path / "ball.plsys"
+    scene.write_text(CAMERA + "sphere { 0, 1 }\n")
+    picture = tmp_path / "ball.pfm"
+    options = ["render", str(scene), "-o", str(picture), "--size", "16x12", "--accel", "grid", "--json"]
+    assert main([*options, "--grid", "4x4x2"]) == 0
+    assert '"accelerator": "grid"' in capsys.readouterr().out
+    with pytest.raises(SystemExit) as stopped:
+        main([*options, "--grid", "4x4"])
+    assert stopped.value.code == 2 and "'4x4' isn't NxMxK" in capsys.readouterr().err
