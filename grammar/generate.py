@@ -2,6 +2,7 @@
 
 vocabulary.toml → ../compiler/reading/vocabulary_rows.py · REFERENCE.md · the lists in queries/highlights.scm
 codes and their fixtures → DIAGNOSTICS.md (diagnostics_page.py)
+queries/*.scm → queries/neovim, queries/helix, queries/emacs (editor_queries.py)
 
     python grammar/generate.py            write them
     python grammar/generate.py --check    compare: exit code 1 and the names of stale files
@@ -16,6 +17,7 @@ import tomllib
 from pathlib import Path
 
 import diagnostics_page
+import editor_queries
 
 HERE = Path(__file__).resolve().parent
 BEGIN, END = "; generated from vocabulary.toml: begin", "; generated from vocabulary.toml: end"
@@ -157,7 +159,7 @@ def outputs() -> dict[Path, str]:
     queries = HERE / "queries/highlights.scm"
     if queries.exists():
         files[queries] = highlights(table, queries.read_text(encoding="utf-8"))
-    return files
+    return files | editor_queries.outputs()
 
 
 def main(arguments: list[str]) -> int:
@@ -166,6 +168,7 @@ def main(arguments: list[str]) -> int:
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             stale.append(path)
             if "--check" not in arguments:
+                path.parent.mkdir(exist_ok=True)
                 path.write_text(text, encoding="utf-8")
     if "--check" in arguments and stale:
         print("stale, run `python grammar/generate.py`:", *(p.relative_to(HERE.parent) for p in stale))
