@@ -9,7 +9,7 @@ import re
 from math import pi
 
 from ..reading import syntax, vocabulary
-from .actions import Spot, TextEdit
+from .actions import Spot, TextEdit, fresh_name
 from .bounding import bounded
 from .document import Message
 
@@ -32,6 +32,17 @@ def remove_definition(spot: Spot, match: re.Match, message: Message) -> Found:
         return None
     what = "this #include" if isinstance(node, syntax.Include) else f"'{node.name.name}'"
     return f"Remove {what}", [spot.cut(spot.base + node.span.start, spot.base + node.span.end)]
+
+
+def rename_definition(spot: Spot, match: re.Match, message: Message) -> Found:
+    """Give a definition whose name plsys has already another one, with the rules in it."""
+    node = spot.definition
+    if node is None or isinstance(node, syntax.Include | syntax.Block):
+        return None
+    old, new = node.name.name, fresh_name(spot.scene, f"my_{node.name.name}")
+    own = [name for name in spot.facts.names if node.span.start <= name.start < node.span.end and name.name == old]
+    edits = [spot.edit(spot.base + name.start, spot.base + name.end, new) for name in own if name.role != "read"]
+    return f"Rename it to '{new}'", edits
 
 
 def remove_rule(spot: Spot, match: re.Match, message: Message) -> Found:
@@ -253,7 +264,10 @@ SCENE_FIXES = {
         (r"^unknown|is (?:not|un)known|nothing defines", define("Calculation", "n = 1;")),
         (r"^unknown|is (?:not|un)known|nothing defines", define("value", "")),
     ),
-    "duplicate-name": ((r"is defined twice|a second \w+ block", remove_definition),),
+    "duplicate-name": (
+        (r"is defined twice|a second \w+ block", remove_definition),
+        (r"of plsys$", rename_definition),
+    ),
     "wrong-kind": (
         (r"an operand: nothing can follow it|a group in brackets is an operand", operand_sum),
         (r"stands in the Selection '(\w+)'", own_target),

@@ -121,6 +121,17 @@ def closed_up_call(spot: Spot, match: re.Match, message: Message) -> Found:
     return "Remove the space", [spot.replace(re.sub(r"\s", "", spot.text))]
 
 
+def separate(mark: str):
+    """A fix that puts ``mark`` behind what stands before the spot."""
+
+    def fix(spot: Spot, match: re.Match, message: Message) -> Found:
+        before = spot.slice(spot.base, spot.start)
+        end = spot.start - len(before[len(before.rstrip()) :].encode())
+        return (f"Add '{mark}'", [spot.edit(end, end, mark)]) if end < spot.start else None
+
+    return fix
+
+
 def add_body(spot: Spot, match: re.Match, message: Message) -> Found:
     body = re.search(r"\{.*\}$", message.diagnostic.hint)
     if body is None:
@@ -189,4 +200,6 @@ HINT_FIXES = (
     (r"did you mean '([^']+)'", suggestion),
     (r"^remove (?:it|them)(?:$|[,;:])", remove),
     (r"or remove the '\+'", remove),
+    (r"^a (?:vector|call) looks like .* comma between two values", separate(",")),
+    (r"^perhaps a ';' is missing before it", separate(";")),
 )
