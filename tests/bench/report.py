@@ -84,40 +84,51 @@ class Results:
         matplotlib.use("Agg")
         from matplotlib import pyplot
 
-        figure, axes = pyplot.subplots(1, 3, figsize=(16, 5), layout="constrained")
-        for name, points in self.curves.items():
-            if name.startswith("fronts"):
-                for axis_set in ("coherent", "random"):
-                    axes[0].plot(
-                        [p["bytes"] / 1e6 for p in points], [p[axis_set] for p in points],
-                        "o-" if axis_set == "coherent" else "s--", label=f"{name[8:]}, {axis_set}",
-                    )  # fmt: skip
-            if name == "growth":
-                x = [p["primitives"] for p in points]
-                axes[1].plot(x, [p["bytes"] / 1e6 for p in points], "o-", label="memory, MB")
-                axes[1].plot(x, [p["build_seconds"] for p in points], "s--", label="build, s")
-                axes[1].plot(x, [p["coherent"] for p in points], "^:", label="coherent, Mray/s")
-            if name.startswith("threads"):
-                axes[2].plot(
-                    [p["threads"] for p in points], [p["rate"] for p in points], "o-", label=name[9:]
-                )
-        for axis, title, x in zip(
-            axes,
-            ("Memory for time: items a front", "Growth: Menger 2 to 10", "Threads"),
-            ("MB", "primitives", "threads"),
-        ):
-            axis.set(title=title, xlabel=x)
-            if axis is not axes[2]:
-                axis.set_xscale("log")
-                axis.set_yscale("log")
-            if axis.lines:
-                axis.legend(fontsize=8)
+        kinds = [kind for kind in PANELS if any(name.startswith(kind) for name in self.curves)]
+        if not kinds:
+            return "no plot: no curve was measured"
+        figure, axes = pyplot.subplots(
+            1, len(kinds), figsize=(5.3 * len(kinds), 5), layout="constrained", squeeze=False
+        )
+        for axis, kind in zip(axes[0], kinds):
+            title, x, y, logarithmic = PANELS[kind]
+            for name, points in self.curves.items():
+                for label, style, xs, ys in lines_of(name, points) if name.startswith(kind) else ():
+                    axis.plot(xs, ys, style, label=label)
+            axis.set(title=title, xlabel=x, ylabel=y)
+            if logarithmic:
+                axis.set(xscale="log", yscale="log")
+            axis.legend(fontsize=8)
             axis.grid(alpha=0.3)
-        axes[0].set_ylabel("Mray/s, one core")
-        axes[2].set_ylabel("Mray/s")
         figure.savefig(path, dpi=110)
         pyplot.close(figure)
         return None
+
+
+# By what a curve's name begins with: title, x, y, logarithmic.
+PANELS = {
+    "fronts": ("Memory for time: items a front", "MB", "Mray/s, one core", True),
+    "growth": ("Growth: Menger 2 to 10", "primitives", "", True),
+    "threads": ("Threads", "threads", "Mray/s", False),
+}
+
+
+def lines_of(name: str, points: list[dict]):
+    """(label, style, xs, ys) of a curve's lines."""
+
+    def column(key: str, scale: float = 1.0) -> list[float]:
+        return [point[key] * scale for point in points]
+
+    short = name.partition(": ")[2]
+    if name.startswith("fronts"):
+        for key, style in (("coherent", "o-"), ("random", "s--")):
+            yield f"{short}, {key}", style, column("bytes", 1e-6), column(key)
+    elif name.startswith("growth"):
+        yield "memory, MB", "o-", column("primitives"), column("bytes", 1e-6)
+        yield "build, s", "s--", column("primitives"), column("build_seconds")
+        yield "coherent, Mray/s", "^:", column("primitives"), column("coherent")
+    else:
+        yield short, "o-", column("threads"), column("rate")
 
 
 def number(value: float) -> str:

@@ -134,3 +134,28 @@ def test_rows_are_judged_by_the_median(tmp_path, capsys):
     data = json.loads((tmp_path / "bench.json").read_text())
     assert data["rows"][0]["value"] == 1.2 and data["rows"][1]["met"] is False and data["cores"] == 2
     assert Row("", "", 1, 1, 1, "", None, False).met is None and size(2.5e6) == "2.5 MB"
+
+
+def test_curves_are_drawn(tmp_path):
+    pytest.importorskip("matplotlib")
+    results = Results()
+    assert results.plot(tmp_path / "none.png") == "no plot: no curve was measured"
+    point = {
+        "bytes": 2e4,
+        "coherent": 1.0,
+        "random": 0.5,
+        "build_seconds": 0.1,
+        "primitives": 400.0,
+        "threads": 1,
+        "rate": 2.0,
+    }
+    results.curves = {"fronts: tree": [point], "growth": [point], "threads: tree": [point]}
+    assert results.plot(tmp_path / "all.png") is None and (tmp_path / "all.png").stat().st_size > 1000
+
+
+def test_povray_draws_and_tells_its_seconds(tmp_path):
+    case = Case("tree", "tree", {"order": 2}, tmp_path)
+    answer = peers.povray(case, tmp_path, 32, 24)
+    if answer is None:
+        pytest.skip("povray isn't installed")
+    assert {"parse", "trace"} <= set(answer) and answer["trace"] >= 0 and answer["rss"] > 1e6
