@@ -52,6 +52,8 @@ def check_recursion(model: Model, diagnostics: Diagnostics) -> None:
         if component & endless:
             if stays_large(members, seed):
                 _report_endless(members[0], members, diagnostics)
+            else:
+                check_scaling(_ways_back(members, component, seed), seed, diagnostics)
         else:
             _check_cycle(members, component, model, diagnostics)
 
@@ -108,12 +110,7 @@ def _check_cycle(
 ) -> None:
     """A cycle that can be left: does something change on the way round that its guards look at?"""
     seed = seed_of(model)
-    back: list[Back] = []
-    for symbol in members:
-        for way in ways(symbol.production):
-            if isinstance(way.leaf, Enter) and way.leaf.symbol in component and is_open(way, seed):
-                if not _is_dropped(way, seed):
-                    back.append((symbol, way))
+    back = _ways_back(members, component, seed)
     drawing = [
         (symbol, way) for symbol, way in back if way.weights or any(draws(test) for test, _ in way.guards)
     ]
@@ -147,6 +144,17 @@ def _check_cycle(
         check_scaling(back, seed, diagnostics)
     elif not _check_direction(back, diagnostics):
         check_termination(back, model, diagnostics)
+
+
+def _ways_back(members: list[Symbol], component: frozenset[str], seed: float) -> list[Back]:
+    """The ways from the members of a recursion to its members that can be taken."""
+    return [
+        (symbol, way)
+        for symbol in members
+        for way in ways(symbol.production)
+        if isinstance(way.leaf, Enter) and way.leaf.symbol in component
+        if is_open(way, seed) and not _is_dropped(way, seed)
+    ]
 
 
 def _is_dropped(way: Way, seed: float) -> bool:

@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from typing import Iterator, NamedTuple
 
-from .check_scaling import Back
+from . import affine
+from .check_scaling import Back, linear_map
 from .diagnostics import Diagnostics
 from .linear import NOTHING, Form, after, difference, form
 from .model import Apply, Assign, Calculate, Constant, Enter, Expression, Model, Read, Symbol
-from .walk import Way, all_ways, components, draws
+from .walk import Way, all_ways, components, draws, seed_of
 
 # Rounds of a counter that are tried out to see whether it meets a value.
 MAX_ROUNDS = 100_000
@@ -62,11 +63,20 @@ def _report(edges: list[Back], starts: _Starts, diagnostics: Diagnostics) -> Non
                 hint = f"the recursion doesn't end there: write {name} {operator} {bound:g}"
                 diagnostics.add("steps-over", span, message, hint)
                 return
+    if all(_shrinks(each, starts.seed) for each in edges):
+        return  # the detail cut-off ends it
     symbol, way = edges[0]
     span = way.leaf.span or symbol.name_span
     message = f"can't prove that this recursion of '{symbol.name}' ends"
     hint = "a counter that each round moves towards its bound would show it: if (n > 0) … [ --n ] …"
     diagnostics.add("unproven", span, message, hint)
+
+
+def _shrinks(edge: Back, seed: float) -> bool:
+    """Whether a way from a symbol to itself surely makes things smaller."""
+    symbol, way = edge
+    matrix = linear_map(way.operators, seed)
+    return _target(way) == symbol.name and matrix is not None and affine.spectral_radius(matrix) < 1 - 1e-9
 
 
 def needs(way: Way) -> Iterator[Need]:
@@ -176,6 +186,7 @@ class _Starts:
     """The constants that parameters have where a recursion is entered."""
 
     def __init__(self, model: Model, back: list[Back]) -> None:
+        self.seed = seed_of(model)
         self.values: dict[str, list[float] | None] = {}
         inside = {id(operator) for _, way in back for operator in way.operators}
         seen: set[int] = set()

@@ -195,6 +195,17 @@ def test_recursions_without_a_proof(rules, code):
     assert codes(f"Selection A {{ [ n = 4 ] A; {rules} }} object {{ A }}") == [code]
 
 
+def test_a_recursion_without_end_that_hardly_shrinks():
+    text = "Selection A { A -> box + [ trans 0 0 1; scale 0.999 ] A; } object { A }"
+    assert codes(text) == ["slow-contraction"]
+    assert codes(text.replace("0.999", "0.9")) == []
+
+
+def test_what_shrinks_needs_no_proof():
+    text = "Selection A { [ n = 4 ] A; if (n > 0) A -> box + [ n -= rand(0); scale 0.5 ] A; } object { A }"
+    assert codes(text) == []
+
+
 def test_counters_one_after_the_other():
     """Figure 2.1: the trunk's counter first, then the tree's."""
     rules = "if (m > 0) A -> [ --m; trans 0 0 1 ] A; else if (n > 0) A -> [ --n; trans 0 0 1 ] A + box;"
