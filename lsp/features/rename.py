@@ -51,6 +51,7 @@ def _renameable(request: Request) -> tuple[str, Place] | None:
     if found is None:
         return None
     name = found[0]
+    request.scene.work()  # of a file that is still being opened, all must be known
     if kind := vocabulary.kind_of(name):
         raise Refused(f"'{name}' is {request.scene.described(kind)} of plsys and can't be renamed")
     if name not in request.scene.entries:

@@ -113,8 +113,7 @@ def _same(old: list[int], new: list[int]) -> tuple[int, int]:
 
 def _tokens(request: Request, first: int, last: int) -> Iterator[tuple[int, int, int, int, int]]:
     """(line, column, length, type, modifiers) of the blocks from ``first`` to ``last``, in text order."""
-    # The namespace is current without resolving what the last edit touched, which can wait.
-    text, entries = request.document.text, request.workspace.scene(request.document).entries
+    text, entries = request.document.text, request.scene.entries
     numbers = {name: TYPES.index(name) for name in TYPES}
     kinds = {kind: (numbers[name], modifiers) for kind, (name, modifiers) in _KINDS.items()}
     for index in range(first, last + 1):
