@@ -107,6 +107,7 @@ class PlStatistics(ctypes.Structure):
         ("detail", c_double),
         ("cut_instances", c_uint64),
         ("cut_max_error", c_double),
+        *((f"lazy_{name}", c_uint64) for name in ("unfolded", "evicted", "states", "bytes", "classes")),
     ]
 
 

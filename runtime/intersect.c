@@ -40,7 +40,7 @@ static bool set_ray(const job *j, size_t i, pl_ray *ray, pl_error *error)
     return true;
 }
 
-static bool describe(pl_tracer *tracer, const pl_hits *out, size_t i, const pl_ray *ray, const pl_hit *hit,
+static bool describe(pl_tracer *tracer, const pl_hits *out, size_t i, const pl_ray *ray, pl_hit *hit,
                      pl_error *error)
 {
     bool found = hit->t < INFINITY;
@@ -48,6 +48,7 @@ static bool describe(pl_tracer *tracer, const pl_hits *out, size_t i, const pl_r
     if (found && (out->symbol || out->rule || out->depth || out->normal) &&
         !pl_trace_surface(tracer, ray, hit, &surface, error))
         return false;
+    if (out->primitive && !pl_trace_number(tracer, hit, error)) return false;
     if (out->t) out->t[i] = hit->t;
     if (out->bound) out->bound[i] = hit->bound;
     if (out->primitive)

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "accel/accel.h"
+#include "accel/lazy.h"
 #include "cut.h"
 #include "error.h"
 #include "table.h"
@@ -151,6 +152,9 @@ static uint64_t generated(const pl_states *states)
     return root->primitives == UINT64_MAX ? UINT64_MAX : root->primitives - own;
 }
 
+/* More states than this aren't built but unfolded when rays come to them. */
+enum { MOST_STATES = 1 << 17 };
+
 /* PX of an endless scene unless something else is asked for. */
 #define ENDLESS_DETAIL 0.5
 
@@ -161,10 +165,16 @@ static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
     pl_states *states = &scene->states;
     pl_error ignored = {.code = PL_OK};
     const double asked = scene->options.detail;
-    const bool needed = scene->accel->states || asked > 0.0;
+    const bool needed = scene->accel->states || asked > 0.0, may_be_lazy = scene->accel == &pl_accel_bvh && !(asked > 0.0);
     if (!pl_states_build(states, scene->program, scene->meshes, scene->accel->node_boxes, limit,
-                         needed ? error : &ignored))
+                         may_be_lazy ? MOST_STATES : 0, needed && !may_be_lazy ? error : &ignored)) {
+        if (may_be_lazy && ignored.code == PL_ERROR_LIMIT && strcmp(ignored.place, "states") == 0) {
+            scene->accel = &pl_accel_lazy;
+            return true;
+        }
+        if (may_be_lazy) *error = ignored;
         return !needed;
+    }
     const bool endless = states->list[0].endless;
     if (!needed && !endless) {
         pl_states_free(states);
@@ -181,7 +191,7 @@ static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
 static bool build(pl_scene *scene, pl_error *error)
 {
     double start = pl_seconds();
-    size_t limit = scene->options.memory ? scene->options.memory : default_memory();
+    const size_t limit = scene->memory = scene->options.memory ? scene->options.memory : default_memory();
     if (!build_meshes(scene, error) || !find_rule_places(scene, error)) return false;
     if (!build_states(scene, limit, error)) return false;
     if (scene->accel->build && !scene->accel->build(scene, error)) return false;
@@ -349,4 +359,13 @@ void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics)
     pthread_mutex_lock(&locked->lock);
     *statistics = scene->statistics;
     pthread_mutex_unlock(&locked->lock);
+    if (scene->accel != &pl_accel_lazy) return;
+    pl_lazy_counts lazy;
+    pl_lazy_count(scene->structure, &lazy);
+    statistics->lazy_unfolded = lazy.unfolded;
+    statistics->lazy_evicted = lazy.evicted;
+    statistics->lazy_states = lazy.states;
+    statistics->lazy_bytes = lazy.bytes;
+    statistics->lazy_classes = lazy.classes;
+    statistics->scene_bytes += lazy.bytes;
 }

@@ -18,6 +18,7 @@ struct pl_scene {
     void *structure; /* the accelerator's */
     size_t mesh_bytes;
     pl_options options;
+    size_t memory; /* bytes that states and structures may take */
     double detail; /* footprints below which instances are cut; 0: only where rounding ends an endless recursion */
     int threads;
     bool all_opaque;

@@ -288,12 +288,13 @@ class Scene:
         primitives (that symbols generate; None: more than 2⁶⁴, or unknown as without states), states, depth (symbols on a path), scene_bytes,
         singular (dropped subtrees), box_tests, primitive_tests, bailout, trace_level, rays {primary, shadow, reflection,
         transmitted}, seconds {verify, build, trace}, accelerator, threads, detail (the cut-off in pixels, 0: none), cut {instances: rays
-        that ended at a cut instance's box, max_error: the largest error bound of their distance, in scene units}.
+        that ended at a cut instance's box, max_error: the largest error bound of their distance, in scene units}, lazy {unfolded, evicted: states, where there are too
+        many to build; states, bytes, classes: of these in memory now}.
         """
         counts = PlStatistics()
         with self._open() as handle:
             library().pl_scene_statistics(handle, ctypes.byref(counts))
-        result: dict = {"rays": {}, "seconds": {}, "cut": {}}
+        result: dict = {"rays": {}, "seconds": {}, "cut": {}, "lazy": {}}
         for name, _ in PlStatistics._fields_:
             group, _, member = name.partition("_")
             place = result[group] if group in result else result

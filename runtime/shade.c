@@ -369,6 +369,7 @@ static bool find_first(pl_shader *shader, const pl_ray *ray, pl_surface *surface
     shader->rays.primary++;
     if (!find(shader, ray, surface, error)) return false;
     if (!first) return true;
+    if (!pl_trace_number(shader->tracer, &shader->hit, error)) return false;
     first->t = shader->hit.t;
     first->primitive = shader->hit.primitive;
     if (first->t != INFINITY) first->surface = *surface;

@@ -197,6 +197,10 @@ static bool grow_table(pl_states *states, pl_error *error)
 static pl_state *add_state(builder *b, uint32_t symbol, const uint64_t *key)
 {
     pl_states *states = b->states;
+    if (states->count >= states->most) {
+        pl_fail(b->error, PL_ERROR_LIMIT, "states", "more than %u states", (unsigned)states->most);
+        return NULL;
+    }
     if (states->count == states->capacity) {
         uint32_t capacity = states->capacity ? 2 * states->capacity : 16;
         size_t more = (capacity - states->capacity) * sizeof *states->list;
@@ -487,11 +491,12 @@ static bool explore(builder *b)
 }
 
 bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree *const *meshes, bool node_boxes,
-                     size_t limit, pl_error *error)
+                     size_t limit, uint32_t most, pl_error *error)
 {
     memset(states, 0, sizeof *states);
     states->program = program;
     states->meshes = meshes;
+    states->most = most ? most : UINT32_MAX;
     states->limit = limit ? limit : PL_STATES_DEFAULT_BYTES;
     builder b = {.states = states, .error = error};
     b.items.element = sizeof(pl_item);

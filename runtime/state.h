@@ -76,12 +76,13 @@ typedef struct pl_states {
     float *coverage;         /* of each state by direction, with cuts (coverage.c) */
     struct pl_block *blocks; /* memory of items, transformations, terms and keys */
     size_t bytes, limit;
+    uint32_t most;
 } pl_states;
 
-/* limit: bytes that the table may take, 0: PL_STATES_DEFAULT_BYTES. */
+/* limit: bytes that the table may take, 0: PL_STATES_DEFAULT_BYTES. most: states, 0: as many as fit. */
 #define PL_STATES_DEFAULT_BYTES ((size_t)4 << 30)
 bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree *const *meshes, bool node_boxes,
-                     size_t limit, pl_error *error);
+                     size_t limit, uint32_t most, pl_error *error);
 void pl_states_free(pl_states *states);
 
 /* The primitive index, in derivation order, of the leaf at a path; UINT64_MAX if the path doesn't exist. depth: 0, or

@@ -106,6 +106,12 @@ bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_erro
     return true;
 }
 
+bool pl_trace_number(pl_tracer *tracer, pl_hit *hit, pl_error *error)
+{
+    const pl_accel *accel = tracer->scene->accel;
+    return !accel->number || hit->t == INFINITY || accel->number(tracer, hit, error);
+}
+
 int pl_trace_any(pl_tracer *tracer, const pl_ray *ray, pl_error *error)
 {
     pl_query query = begin_query(tracer, ray, PL_QUERY_ANY, error);

@@ -54,6 +54,9 @@ void pl_hit_free(pl_hit *hit);
 /* The foremost hit (ties: first in path order). false: an error (hit->t is then INFINITY). */
 bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_error *error);
 
+/* Makes sure that a hit's primitive index is known: where states are unfolded on touch, tracing doesn't count. */
+bool pl_trace_number(pl_tracer *tracer, pl_hit *hit, pl_error *error);
+
 /* Whether anything stands between t_min and t_max: -1 error, 0 no, 1 yes. */
 int pl_trace_any(pl_tracer *tracer, const pl_ray *ray, pl_error *error);
 

@@ -233,6 +233,7 @@ def _facts(arguments: argparse.Namespace, statistics: dict, seconds: dict, left_
         "states": statistics["states"],
         "detail": statistics["detail"],
         "cut": statistics["cut"],
+        "lazy": statistics["lazy"],
         "rays": statistics["rays"],
         "seconds": {name: round(value, 6) for name, value in seconds.items()},
         "memory": {

@@ -92,12 +92,14 @@ struct pl_accel {
     bool (*trace)(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
     /* The items from the scene's to the leaf's at a trail; NULL: its hits have paths. false: no memory. */
     bool (*items)(const pl_scene *scene, const pl_path *trail, pl_items *items);
+    /* Finds a hit's primitive index where tracing leaves it open; NULL: it doesn't. false: an error. */
+    bool (*number)(pl_tracer *tracer, pl_hit *hit, pl_error *error);
 };
 
 /* The union terms of items, one after another. false: no memory. */
 bool pl_items_path(const pl_items *items, pl_path *path);
 
-extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh, pl_accel_gated, pl_accel_grid;
+extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh, pl_accel_gated, pl_accel_grid, pl_accel_lazy;
 
 /* One step of the normative chain. */
 static inline void pl_map_ray(const pl_transform *transform, double o[3], double d[3])

@@ -129,6 +129,8 @@ typedef struct pl_statistics {
     double detail;          /* the cut-off in use, in pixel footprints; 0: none */
     uint64_t cut_instances; /* rays whose foremost hit is a cut instance's box */
     double cut_max_error;   /* the largest error bound of these, in scene units */
+    /* Where there are too many states to build: unfolded when rays came to them, thrown out again, and in memory now. */
+    uint64_t lazy_unfolded, lazy_evicted, lazy_states, lazy_bytes, lazy_classes;
 } pl_statistics;
 
 PL_API void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics);

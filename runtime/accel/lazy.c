@@ -1,0 +1,233 @@
+/* lazy.c - bvh where there are too many states to build: they are unfolded when a ray comes to them (lazy.h).
+ *
+ * A frame is an instance on the way from the root, with its state pinned; an entry of the stack is an item of a frame that is
+ * still to be visited. Entries are visited depth first, near ones first, so frames form a stack as well. Boxes only
+ * filter, so neither what is in the cache nor how loose the classes' boxes are shows in a hit. */
+#include "lazy.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "../error.h"
+
+typedef struct frame {
+    pl_lazy_state *state;
+    const pl_item *item; /* of the parent frame's state; NULL at the root */
+    uint32_t parent, depth;
+    double o[3], d[3];
+} frame;
+
+typedef struct pending {
+    double t_entry;
+    uint32_t frame, item;
+} pending;
+
+typedef struct work {
+    pl_unfolder *unfolder;
+    frame *frames;
+    pending *stack;
+    size_t frame_count, frame_capacity, stack_count, stack_capacity;
+} work;
+
+static void work_destroy(void *memory)
+{
+    work *w = memory;
+    if (!w) return;
+    pl_unfolder_free(w->unfolder);
+    free(w->frames);
+    free(w->stack);
+    free(w);
+}
+
+static void *work_create(const pl_scene *scene, pl_error *error)
+{
+    work *w = calloc(1, sizeof *w);
+    if (w && (w->unfolder = pl_unfolder_create(scene, error))) return w;
+    free(w);
+    pl_fail_memory(error, "preparing to trace");
+    return NULL;
+}
+
+static bool grow(void *array, size_t count, size_t *capacity, size_t element, pl_error *error)
+{
+    void **place = array, *data;
+    if (count < *capacity) return true;
+    size_t more = 2 * count + 64;
+    if (!(data = realloc(*place, more * element))) return pl_fail_memory(error, "tracing a ray");
+    *place = data;
+    *capacity = more;
+    return true;
+}
+
+static void leave_frames(work *w, size_t count)
+{
+    while (w->frame_count > count) pl_lazy_release(w->frames[--w->frame_count].state);
+}
+
+/* Pushes the items that the ray meets, the nearest last. */
+static bool push_items(work *w, uint32_t index, pl_query *query, pl_counters *counters)
+{
+    const frame *f = &w->frames[index];
+    const pl_lazy_state *state = f->state;
+    const size_t first = w->stack_count;
+    pl_slab slab = pl_slab_of(f->o, f->d, pl_reach_slack(&state->reach, f->o));
+    for (uint32_t i = 0; i < state->item_count; i++) {
+        const pl_lazy_item *it = &state->items[i];
+        double t_entry = query->t_min;
+        if (query->shadow && it->item.no_shadow) continue;
+        if (!it->unbounded) {
+            counters->box_tests++;
+            if (pl_box_is_empty(&it->box)) continue;
+            if (!pl_slab_hits(&slab, &it->box, query->t_min, query->t_max, &t_entry)) {
+                if (f->depth > counters->miss_depth) counters->miss_depth = f->depth;
+                continue;
+            }
+        }
+        if (!grow(&w->stack, w->stack_count, &w->stack_capacity, sizeof *w->stack, query->error)) return false;
+        size_t place = w->stack_count++;
+        for (; place > first && w->stack[place - 1].t_entry < t_entry; place--) w->stack[place] = w->stack[place - 1];
+        w->stack[place] = (pending){t_entry, index, i};
+    }
+    return true;
+}
+
+/* Goes into an instance whose ray stands in o and d. */
+static bool enter(pl_tracer *tracer, uint32_t symbol, const uint64_t *scope, const frame *as, pl_query *query)
+{
+    work *w = tracer->work;
+    pl_lazy_cache *cache = tracer->scene->structure;
+    frame f = *as;
+    if (f.depth > PL_LIMIT_DEPTH)
+        return pl_fail_at(query->error, PL_ERROR_LIMIT, tracer->scene->program, symbol,
+                          "depth: a ray came %d symbols deep, which is the limit; does the recursion end?", PL_LIMIT_DEPTH);
+    if (!grow(&w->frames, w->frame_count, &w->frame_capacity, sizeof *w->frames, query->error)) return false;
+    if (!(f.state = pl_lazy_get(cache, w->unfolder, symbol, scope, query->error))) return false;
+    w->frames[w->frame_count++] = f;
+    return push_items(w, (uint32_t)w->frame_count - 1, query, &tracer->counters);
+}
+
+/* A position on the stack of frames, and the item at its end. */
+typedef struct source {
+    const work *work;
+    uint32_t frame;
+    const pl_item *item;
+} source;
+
+/* The union terms from the root: the items' terms of the chain of frames, written from the end. */
+static bool write_path(const void *context, pl_path *path)
+{
+    const source *s = context;
+    uint32_t length = s->item->term_count, index = s->frame;
+    for (; s->work->frames[index].item; index = s->work->frames[index].parent)
+        length += s->work->frames[index].item->term_count;
+    if (length && !pl_path_push(path, length - 1, 0)) return false;
+    path->length = length;
+    const pl_item *item = s->item;
+    for (index = s->frame; item; index = s->work->frames[index].parent) {
+        length -= item->term_count;
+        if (item->term_count) memcpy(path->terms + length, item->terms, item->term_count * sizeof *item->terms);
+        item = s->work->frames[index].item;
+    }
+    return true;
+}
+
+static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
+{
+    work *w = tracer->work;
+    const frame *parent = &w->frames[at->frame];
+    const pl_lazy_item *it = &parent->state->items[at->item];
+    const pl_item *item = &it->item;
+    frame f = {.item = item, .parent = at->frame, .depth = parent->depth + 1};
+    memcpy(f.o, parent->o, sizeof f.o);
+    memcpy(f.d, parent->d, sizeof f.d);
+    for (uint32_t i = 0; i < item->transform_count; i++) pl_map_ray(item->transforms[i], f.o, f.d);
+    if (item->kind == PL_NODE_ENTER) return enter(tracer, item->what, it->scope, &f, query);
+    source s = {w, at->frame, item};
+    pl_leaf leaf = {.arguments = item->arguments, .primitive = UINT64_MAX, .path = write_path, .source = &s};
+    if (item->kind == PL_NODE_MESH) leaf.mesh = tracer->scene->meshes[item->what];
+    else leaf.shape = item->what;
+    tracer->counters.primitive_tests++;
+    return pl_query_leaf(query, &leaf, f.o, f.d);
+}
+
+static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
+{
+    work *w = tracer->work;
+    frame root = {.item = NULL};
+    memcpy(root.o, ray->origin, sizeof root.o);
+    memcpy(root.d, ray->direction, sizeof root.d);
+    w->stack_count = 0;
+    bool ok = enter(tracer, UINT32_MAX, NULL, &root, query);
+    for (uint64_t steps = 0; ok && w->stack_count && !query->done; steps++) {
+        pending at = w->stack[--w->stack_count];
+        if (steps > PL_LIMIT_RAY_STEPS) ok = pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
+        else if (at.t_entry > query->t_max) continue;
+        leave_frames(w, at.frame + 1);
+        ok = ok && visit(tracer, &at, query);
+    }
+    leave_frames(w, 0);
+    return ok;
+}
+
+/* Whether the walk stands before the path, and not above it. */
+static bool is_before(const pl_walk *walk, const pl_path *path)
+{
+    for (uint32_t i = 0; i < walk->at.terms && i < path->length; i++)
+        if (walk->path.terms[i] != path->terms[i]) return true;
+    return false;
+}
+
+/* The primitive's index: the derivation up to it, without what classes can count. */
+static bool number(pl_tracer *tracer, pl_hit *hit, pl_error *error)
+{
+    const pl_program *program = tracer->scene->program;
+    pl_walk *walk = &tracer->walk;
+    walk->follow = NULL;
+    pl_walk_restart(walk, 0, NULL);
+    uint64_t index = 0;
+    for (;;) {
+        pl_bounds bounds;
+        switch (pl_walk_next(walk, error)) {
+        case PL_EVENT_ERROR: return false;
+        case PL_EVENT_END: hit->primitive = UINT64_MAX; return true;
+        case PL_EVENT_ENTER:
+            if (!is_before(walk, &hit->path)) break;
+            pl_classes_bound(pl_lazy_classes(tracer->scene->structure), program->nodes[walk->node].as.enter.symbol,
+                             &walk->scope, &bounds);
+            if (bounds.count == UINT64_MAX) break;
+            index += bounds.count;
+            pl_walk_prune(walk);
+            break;
+        case PL_EVENT_PRIMITIVE:
+        case PL_EVENT_MESH:
+            if (!is_before(walk, &hit->path) && walk->at.terms == hit->path.length) {
+                hit->primitive = index;
+                return true;
+            }
+            index++;
+            break;
+        default: break;
+        }
+    }
+}
+
+static bool build(pl_scene *scene, pl_error *error)
+{
+    size_t limit = scene->memory, base = scene->program->bytes + scene->mesh_bytes;
+    scene->structure = pl_lazy_cache_create(scene, limit > base ? limit - base : 0, error);
+    return scene->structure != NULL;
+}
+
+static void destroy(pl_scene *scene)
+{
+    pl_lazy_cache_free(scene->structure);
+    scene->structure = NULL;
+}
+
+const pl_accel pl_accel_lazy = {.name = "bvh",
+                                .build = build,
+                                .destroy = destroy,
+                                .work_create = work_create,
+                                .work_destroy = work_destroy,
+                                .trace = trace,
+                                .number = number};

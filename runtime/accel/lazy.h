@@ -1,0 +1,62 @@
+/* lazy.h - states unfolded on first touch, kept in a cache of fixed size.
+ *
+ * Where every plant is its own (a live random key) or updates don't commute, there are too many states to build. Then a
+ * state is unfolded one application at a time, when a ray comes to it: its items, each with a box from the
+ * classes (class.h), which are conservative without anything below being unfolded. What isn't in use is thrown out by the
+ * clock when the budget is used up, and unfolded again when it is needed: a state is a pure function of its key.
+ *
+ *     pl_lazy_state *state = pl_lazy_get(cache, unfolder, symbol, &scope, error);     pinned
+ *     …
+ *     pl_lazy_release(state);
+ *
+ * Shared by all threads: shards by key, each with a lock; an unfolding holds none. */
+#ifndef PL_LAZY_H
+#define PL_LAZY_H
+
+#include <stdatomic.h>
+
+#include "../class.h"
+#include "accel.h"
+
+typedef struct pl_lazy_item {
+    pl_item item; /* of an enter item, `what` is the symbol's node */
+    pl_box box;   /* in the state's frame */
+    pl_reach reach;
+    bool unbounded;
+    const uint64_t *scope; /* of an enter item: packed, as it is there */
+} pl_lazy_item;
+
+typedef struct pl_lazy_state {
+    struct pl_lazy_state *next; /* in its bucket */
+    uint64_t hash;
+    uint32_t symbol, key_words, item_count;
+    atomic_uint pins;
+    atomic_bool touched;
+    size_t bytes;
+    pl_reach reach; /* of all its items */
+    const uint64_t *key;
+    const pl_lazy_item *items;
+} pl_lazy_state;
+
+typedef struct pl_lazy_cache pl_lazy_cache;
+typedef struct pl_unfolder pl_unfolder; /* a thread's working memory */
+
+pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_error *error);
+void pl_lazy_cache_free(pl_lazy_cache *cache);
+
+pl_unfolder *pl_unfolder_create(const pl_scene *scene, pl_error *error);
+void pl_unfolder_free(pl_unfolder *unfolder);
+
+/* The state that a packed scope leads to at a symbol (UINT32_MAX, NULL: the scene itself), pinned. NULL: an error. */
+pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_unfolder *unfolder, uint32_t symbol, const uint64_t *scope,
+                           pl_error *error);
+void pl_lazy_release(pl_lazy_state *state);
+
+typedef struct pl_lazy_counts {
+    uint64_t states, bytes, unfolded, evicted, classes, classes_emptied;
+} pl_lazy_counts;
+void pl_lazy_count(pl_lazy_cache *cache, pl_lazy_counts *counts);
+
+pl_classes *pl_lazy_classes(pl_lazy_cache *cache);
+
+#endif

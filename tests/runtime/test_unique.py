@@ -1,0 +1,102 @@
+"""Unique instances: more states than there is memory for, unfolded when rays come to them, with the same hits."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from plsys.compiler.pipeline import build
+from plsys.compiler.reading.source import Source
+from plsys.runtime import Scene
+
+FOREST = """
+global_settings { assumed_gamma 1.0 seed 3 }
+camera { location <-5, -30, 14> sky <0, 0, 1> right <-4/3, 0, 0> look_at <10, 10, 2> angle 50 }
+light_source { <-40, -60, 80> color rgb 1 }
+object { Forest texture { pigment { color rgb <0.45, 0.30, 0.15> } finish { ambient 0.1 diffuse 0.7 } } }
+Selection Forest {
+    C_start Forest;
+    if (level > 0) Forest -> [ --level; side /= 2 ] (Forest + [ trans side 0 0 ] Forest + [ trans 0 side 0 ] Forest + [ trans side side 0 ] Forest);
+    else           Forest -> [ trans rand(1) rand(2) 0; rotz 360*rand(3); scale 0.8 + 0.4*rand(4) ] Tree;
+}
+Calculation C_start { level = %d; side = 2.5*pow(2, level); }
+Selection Tree {
+    C_tree Tree;
+    if (n > 0) Tree -> T_scale cylinder + [ --n; bend = mix(25, 35, rand(1)) ] (T_a Tree + T_b Tree);
+    else       Tree -> 3: T_scale cylinder | 1: [ scale 0.2 ] sphere;
+}
+Calculation C_tree { n = %d; bend = 30; }
+Transformation T_scale { scale 0.08 0.08 1; }
+Transformation T_a { trans 0 0 0.98; roty bend; scale 0.7 + 0.1*rand(5); }
+Transformation T_b { trans 0 0 0.98; rot -bend 0 1 0.1*sin(bend); rotz 90 + (rand(7) < 0.5 ? 30 : -30)*abs(rand(6)); scale exp(-0.3*max(rand(5), 0.5)); }
+"""
+
+
+def forest(level: int, order: int) -> bytes:
+    return build(Source("forest.plsys", (FOREST % (level, order)).encode())).encode()
+
+
+def picture(data: bytes, **options):
+    with Scene(data, **options) as scene:
+        return scene.render(40, 30, channels=("color", "depth", "primitive", "normal")), scene.statistics
+
+
+@pytest.mark.parametrize("memory", [60_000, 400_000, 4_000_000])
+def test_a_budget_changes_no_bit_of_a_picture(memory):
+    data = forest(2, 5)
+    expected, plain = picture(data, accelerator="none")
+    found, counts = picture(data, memory=memory, threads=2)
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values, err_msg=name)
+    if memory < 1_000_000:
+        assert counts["lazy"]["unfolded"] > counts["lazy"]["states"] > 0
+        assert counts["lazy"]["evicted"] > 0 and counts["lazy"]["bytes"] < memory
+    else:
+        assert counts["lazy"]["unfolded"] == 0 and counts["states"] > 1000
+
+
+def test_more_states_than_can_be_built_are_unfolded_on_touch():
+    """As hits of single rays; 256 trees of 255 primitives and more, no two alike."""
+    data = forest(4, 7)
+    random = np.random.default_rng(4)
+    origins = random.uniform((0, 0, 8), (40, 40, 9), (60, 3))
+    directions = random.uniform(-0.3, 0.3, (60, 3)) - (0, 0, 1)
+    results = []
+    for options in ({"accelerator": "none"}, {"memory": 1_000_000}, {"memory": 200_000}):
+        with Scene(data, **options) as scene:
+            results.append(scene.intersect(origins, directions))
+            if "memory" in options:
+                assert 0 < scene.statistics["lazy"]["unfolded"]
+    assert np.isfinite(results[0].t).any()
+    for result in results[1:]:
+        for name, ours, expected in zip(result._fields, result, results[0]):
+            np.testing.assert_array_equal(ours, expected, err_msg=name)
+
+
+PROBE = """
+import resource, sys
+from plsys.runtime import Scene
+data, memory = open(sys.argv[1], "rb").read(), int(sys.argv[2])
+with Scene(data, memory=memory or None, threads=1) as scene:
+    scene.render(64, 48)
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, scene.statistics["lazy"]["unfolded"])
+"""
+
+
+def peak(path, memory: int) -> tuple[int, int]:
+    output = subprocess.run([sys.executable, "-c", PROBE, path, str(memory)], capture_output=True, text=True, check=True)
+    bytes_, unfolded = output.stdout.split()
+    return int(bytes_), int(unfolded)
+
+
+def test_memory_stays_under_the_budget(tmp_path):
+    (tmp_path / "forest.plsb").write_bytes(forest(4, 10))
+    (tmp_path / "tree.plsb").write_bytes(forest(0, 0))
+    without, _ = peak(tmp_path / "tree.plsb", 0)
+    budget = 8 << 20
+    with_, unfolded = peak(tmp_path / "forest.plsb", budget)
+    assert unfolded > 0
+    assert with_ - without <= 1.1 * budget
