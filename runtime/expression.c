@@ -228,7 +228,8 @@ static bool transform(const machine *m, uint8_t opcode, const double *a)
     const pl_op_row *row = pl_op_row_of(opcode);
     for (int i = 0; i < row->pops; i++)
         if (!is_finite(a[i]))
-            return fail_argument(m, row->name, i + 1, a[i]);
+            /* In the text both kinds of scale are one word. */
+            return fail_argument(m, opcode == PL_OP_SCALE_UNIFORM ? "scale" : row->name, i + 1, a[i]);
     switch (opcode) {
     case PL_OP_TRANS:
         for (int r = 0; r < 3; r++) {

@@ -29,7 +29,7 @@ def add_input_arguments(parser: argparse.ArgumentParser) -> None:
         type=parameter,
         action="append",
         default=[],
-        help="set a Parameter of the scene",
+        help="set a Parameter of the scene; may be given several times",
     )
     parser.add_argument("--seed", type=int, help="set the random seed instead of global_settings' seed")
 

@@ -81,6 +81,12 @@ class Scope:
     def __len__(self) -> int:
         return len(self.key)
 
+    def known(self, row: int) -> str:
+        """``" (n = 3, len = 0.5)"``: the parameters that one instance has, for a message; empty if it has none."""
+        values = {name: float(self.parameters[row, slot]) for name, slot in self.slots.items()}
+        known = [f"{name} = {value:.17g}" for name, value in values.items() if not np.isnan(value)]
+        return f" ({', '.join(known)})" if known else ""
+
 
 def evaluate(expression: Expression, scope: Scope, rows: np.ndarray | None = None) -> np.ndarray:
     """The values (len(rows),) of an expression for some instances (None: all). Draws are entered in

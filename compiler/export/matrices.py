@@ -23,11 +23,14 @@ def identity(n: int) -> np.ndarray:
 def chain(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """a·b: first b, then a. Either may be a single (3, 4) matrix."""
     product = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    for row in range(3):
-        x, y, z, t = (a[..., row, k] for k in range(4))
-        for column in range(4):
-            value = x * b[..., 0, column] + y * b[..., 1, column] + z * b[..., 2, column]
-            product[..., row, column] = value + t if column == 3 else value
+    with np.errstate(
+        all="ignore"
+    ):  # what isn't finite stays visible in the product, for the caller to report
+        for row in range(3):
+            x, y, z, t = (a[..., row, k] for k in range(4))
+            for column in range(4):
+                value = x * b[..., 0, column] + y * b[..., 1, column] + z * b[..., 2, column]
+                product[..., row, column] = value + t if column == 3 else value
     return product
 
 

@@ -115,10 +115,10 @@ def _copy(source: BinaryIO, target: BinaryIO, length: int) -> None:
 
 def _write_head(graph: Graph, file: TextIO, result: Exported) -> None:
     lines = [
+        "#version 3.7;",
         f"// Written by plsys, unfolded; primitives: {result.primitives}",
         "// Reference image in linear light: povray +I… +FN16 File_Gamma=1.0 Dither=off -A",
         *(f"// Not carried: {line}" for line in result.lost),
-        "#version 3.7;",
         _settings(graph.settings),
     ]
     if graph.camera is not None:

@@ -50,9 +50,12 @@ def draw(scene: str | Path, width: int, height: int) -> Drawing:
     program = find_povray()
     with tempfile.TemporaryDirectory() as folder:
         image, log = Path(folder) / "povray.png", Path(folder) / "log.txt"
+        # By a name of its own: POV-Ray can't open paths that aren't ASCII.
+        link = Path(folder) / "scene.pov"
+        link.symlink_to(Path(scene).resolve())
         command = [
             program,
-            f"+I{Path(scene).resolve()}",
+            f"+I{link}",
             f"+O{image}",
             f"+W{width}",
             f"+H{height}",

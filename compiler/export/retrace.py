@@ -146,7 +146,7 @@ class Retracer:
         if np.isinf(foremost).any() or (which != which[0]).any():
             verdict.why = "a ray a millionth of a pixel away hits something else"
         second = np.partition(table[0], 1)[1] if table.shape[1] > 1 else np.inf
-        if second - foremost[0] <= TIE * max(1.0, float(foremost[0])):
+        if np.isfinite(second) and second - foremost[0] <= TIE * max(1.0, float(foremost[0])):
             verdict.why = "two surfaces coincide"
         part, column = divmod(int(which[0]), len(rows))
         return _Surface(int(rows[column]), part, foremost)

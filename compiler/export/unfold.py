@@ -22,7 +22,7 @@ from typing import Iterator
 import numpy as np
 
 from .. import elementary
-from ..bytecode.layout_rows import SHAPES
+from ..bytecode.layout_rows import OPCODES, SHAPES
 from ..graph import graph as g
 from ..reading.diagnostics import PlsysError
 from . import matrices, textures
@@ -307,12 +307,18 @@ class _Derivation:
         scope, running, sums = self._scope(at), np.zeros(len(at)), []
         for weight, _ in node.cases:
             value = evaluate(weight, scope)
-            if not (np.isfinite(value) & (value >= 0)).all():
-                raise PlsysError("a weight is negative or not a finite number", place(weight) or place(node))
+            right = np.isfinite(value) & (value >= 0)
+            if not right.all():
+                bad = int(np.argmin(right))
+                raise PlsysError(
+                    f"a weight is {value[bad]:.17g}: negative or not a finite number" + scope.known(bad),
+                    place(weight) or place(node),
+                )
             running = running + value
             sums.append(running)
         if not (running > 0).all():
-            raise PlsysError("all weights are 0", place(node))
+            bad = int(np.argmin(running > 0))
+            raise PlsysError("all weights are 0" + scope.known(bad), place(node))
         stream = np.full(len(at), elementary.CHOICE_STREAM, np.uint64)
         threshold = draw(scope, np.arange(len(at)), stream, node) * running
         chosen = np.argmax(np.stack(sums) > threshold, axis=0)
@@ -326,12 +332,15 @@ class _Derivation:
         else:
             scope, local = self._scope(at), matrices.identity(len(at))
             for step in node.steps:
-                local = matrices.chain(
-                    local, matrices.STEPS[step.operation](*(evaluate(a, scope) for a in step.arguments))
-                )
-                if not np.isfinite(local).all():
+                arguments = [evaluate(a, scope) for a in step.arguments]
+                local = matrices.chain(local, matrices.STEPS[step.operation](*arguments))
+                finite = np.isfinite(local).all(axis=(1, 2))
+                if not finite.all():
+                    numbers = " ".join(f"{a[np.argmin(finite)]:.17g}" for a in arguments)
                     raise PlsysError(
-                        f"{step.operation} gives a matrix that is not finite", place(step) or place(node)
+                        f"{_spelled(step.operation)} {numbers} gives a matrix that is not finite"
+                        + scope.known(int(np.argmin(finite))),
+                        place(step) or place(node),
                     )
             at = at.but(draws=scope.draws)
         singular = np.broadcast_to(matrices.is_singular(local), len(at))
@@ -350,3 +359,8 @@ class _Derivation:
             changes["values"] = textures.rows(node.texture, scope, self.unfolding.width)
             changes["draws"] = scope.draws
         return at.but(**changes)
+
+
+def _spelled(operation: str) -> str:
+    """An operation as it stands in the text: the bytecode has more than one for ``scale``."""
+    return OPCODES[operation].row.removeprefix("operation.")

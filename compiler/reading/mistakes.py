@@ -86,6 +86,12 @@ _HABITS = (
     (re.compile("[“”„«»]|'"), "this is not the quotation mark of a text", 'write "'),
 )
 
+# What stands in an operation's arguments only with brackets round it.
+COMPARISON = re.compile(r"[=!<>]=|[<>?]|&&|\|\|")
+IN_BRACKETS = (
+    "in an operation's arguments, what compares or chooses stands in brackets: scale (n > 2 ? 1 : 0.5)"
+)
+
 # Directives: what to do instead.
 _INSTEAD = {
     "while": "a Selection repeats: Selection Row { if (n > 0) Row -> …; }",
@@ -251,6 +257,9 @@ def unexpected(reading: Reading, node: Node, context: Node | None = None) -> Dia
             return never_closed(reading, start, text[opener], _CLOSER_OF[text[opener]])
     match = re.search(r'"[^"]*"|#?\w+|[^\w\s]+', reading.text(node)) or re.search(r"\s*", text)
     hint = _expected(context or node.parent)
+    inside = node.parent.type if node.parent is not None else ""
+    if inside in ("operation", "statements") and COMPARISON.fullmatch(match[0]):
+        hint = IN_BRACKETS
     span = _part(reading, node, match)
     if _OPERATOR.fullmatch(match[0]) and re.match(rb"[ \t]*([;)}\],\r\n]|$)", reading.data[span.end :]):
         return _diagnostic("missing", span, f"nothing stands after this '{match[0]}'", hint)

@@ -199,9 +199,11 @@ class _Body:
         for i, rule in enumerate(late):
             target, union_left, end = self.take_last(union)
             if target is None:
-                self.reading.complain(
-                    rule.children[0], "nothing stands before this arrow that a rule could be for", RULE
-                )
+                arrow = rule.children[0]
+                if not any(d.span.start == arrow.start_byte for d in self.reading.diagnostics.items):
+                    self.reading.complain(
+                        arrow, "nothing stands before this arrow that a rule could be for", RULE
+                    )
                 return union, pieces
             if i == 0:
                 first = union_left

@@ -16,7 +16,7 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from . import syntax
+from . import mistakes, syntax
 from .diagnostics import Diagnostics, Note
 from .source import Source, Span
 
@@ -93,7 +93,13 @@ class Reading:
         """Complain unless ``node`` ends with ``closer``; the message points at the opener."""
         if node.children[-1].type == closer and not node.children[-1].is_missing:
             return True
-        self.never_closed(node.start_byte, opener, closer)
+        end = len(self.data) - len(self.data[node.end_byte :].lstrip())
+        after = mistakes.COMPARISON.match(self.data[end : end + 2].decode(errors="replace"))
+        if opener == "[" and after:
+            span = Span(self.source, end, end + len(after[0]))
+            self.complain(span, f"'{after[0]}' is unexpected here", mistakes.IN_BRACKETS)
+        else:
+            self.never_closed(node.start_byte, opener, closer)
         return False
 
     def never_closed(self, offset: int, opener: str, closer: str) -> None:

@@ -257,6 +257,7 @@ ERRORS = {
         node("transform_code", "const 1e200; scale_uniform; const 1e200; scale_uniform; end"),
         "the transformation's matrix isn't finite",
     ),
+    "scale": (node("transform_code", "load n; load n; divide; scale_uniform; end"), "argument 1 of scale is NaN"),
     "guard": (node("branch", "load n; load n; divide; end"), "the condition is NaN"),
     "argument": (node("primitive", "load n; log; end", shape="cone"), "argument 1 of cone is -infinity"),
     "colour": (

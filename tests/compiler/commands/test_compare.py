@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,6 +47,17 @@ def test_the_tree_is_povrays_tree(tmp_path, capsys):
 def test_inputs_and_seed_reach_both_pictures(capsys):
     arguments = ["compare", "scenes/tree3d.plsys", "--size", "80x60", "--seed", "5", "--json"]
     assert main(arguments) == 0
+    assert json.loads(capsys.readouterr().out)["passed"]
+
+
+@needs_povray
+@pytest.mark.povray
+def test_a_scene_may_have_any_name(tmp_path, capsys):
+    """POV-Ray itself opens no file whose path isn't ASCII."""
+    scene = tmp_path / "größe ☂" / "kürbis 1.plsys"
+    scene.parent.mkdir()
+    scene.write_text(Path("scenes/shading.plsys").read_text())
+    assert main(["compare", str(scene), "--size", "40x30", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["passed"]
 
 

@@ -39,6 +39,7 @@ def test_one_union_a_texture_and_short_forms_where_the_transform_allows(tmp_path
     result = export_povray(build("scenes/tree.plsys").graph, path)
     text = path.read_text()
     assert result.primitives == 2050 and result.by_kind == {"cylinder": 2049, "plane": 1}
+    assert text.startswith("#version 3.7;\n"), "otherwise POV-Ray takes an older version's opacity"
     assert text.count("union {") == 1
     assert len(re.findall(r"^cylinder\{<[^>]*>,<[^>]*>,[^,}]*\}$", text, re.MULTILINE)) == 2049
     assert "matrix" not in text

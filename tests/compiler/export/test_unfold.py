@@ -3,6 +3,8 @@ memory."""
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from plsys.compiler import elementary
@@ -171,13 +173,16 @@ def test_endless_derivations_end_with_a_limit_that_has_a_name(body, limit):
     "body, message",
     [
         ("S -> [ a = 1/z; scale a ] sphere", "'a'.*inf"),
-        ("S -> [ scale sqrt(z - 1) ] sphere", "finite"),
+        ("S -> [ scale sqrt(z - 1) ] sphere", r": scale nan gives .* not finite \(z = 0\)"),
+        ("S -> [ trans 1/z 0 0 ] sphere", r"trans inf 0 0 .* not finite \(z = 0\)"),
+        ("S -> z: sphere | z: box", r"weights are 0 \(z = 0\)"),
         ("S -> min(z - 1, 2): sphere | 2: box", "weight"),
         ("S -> [ variants z + 0.5 ] sphere", "variants"),
     ],
 )
 def test_bad_values_are_errors_with_a_place(body, message):
     text = f"object {{ S }}\nSelection S {{ C S; {body}; }}\nCalculation C {{ z = rand(0)*0; }}"
-    with pytest.raises(PlsysError, match=message) as caught:
+    with warnings.catch_warnings(), pytest.raises(PlsysError, match=message) as caught:
+        warnings.simplefilter("error")
         list(unfold(graph_of(text)))
     assert ":2:" in caught.value.place
