@@ -343,6 +343,9 @@ class Session:
     def _take(self, result: Result) -> None:
         """Show what the whole-file checks found."""
         result.apply()
+        if result.answer.more and self._checker is not None:
+            self._checker.want(result.snapshot.scene)
+            self._checker.go()
         for document in result.snapshot.scene.documents:
             if document in self.workspace.uris:
                 self._changed[document] = None

@@ -190,6 +190,11 @@ class Text:
                 if ends is not None:
                     high = ends + 1
                     continue
+            # Where the block after the edited ones starts no longer, what follows it may start elsewhere too.
+            after = len(new) - len(self.blocks[high - 1].data) if high < len(self.blocks) else 0
+            if not any(piece.start == after for piece in pieces):
+                high = min(len(self.blocks), 2 * high - low)
+                continue
             joined, taken = self._joined(pieces, high)
             if not taken:
                 break

@@ -93,6 +93,7 @@ def test_a_mistake_and_its_repair(old, new):
     assert told(project, document) == errors
     project.edit(document, at, at + len(new), old)
     project.scene_of(document).whole.clear()
+    project.scene_of(document).general.clear()
     assert told(project, document) == []
 
 

@@ -1,0 +1,179 @@
+"""The parts of a scene that have nothing to do with each other, so that an edit is checked with its own part only.
+
+Blocks → :class:`Part`\\ s. Blocks are *tied* when they share a name that one of them defines or assigns. *Shared* blocks
+tie nothing, since they are the same to everyone: constants, inputs, declared textures, Transformations of plain
+numbers, and what the scene has once (camera, lights, settings: *general*). A part is checked together with the shared
+blocks that it needs and with the general ones. A shared block that nothing uses is a part of its own, and so are the
+general blocks alone, as the part without blocks.
+
+Example: two trees with symbols, Calculations and objects of their own are two parts, even if they have one bark.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Iterable, Iterator, NamedTuple
+
+from ..reading import syntax, vocabulary
+from .facts import Facts, facts_of
+from .text import Block
+
+_SHARED = frozenset(("value", "input", "texture", "pigment", "finish", "color_map"))
+_GENERAL = frozenset(("camera", "light_source", "background", "global_settings"))
+
+
+class Role(NamedTuple):
+    """``kind``: tied, shared or general; the scene's names that the block uses, and those that it defines or assigns."""
+
+    kind: str
+    names: frozenset[str]
+    defined: frozenset[str]
+
+
+def role_of(block: Block) -> Role:
+    found = block.__dict__.get("role")
+    if found is None:
+        found = block.__dict__["role"] = _role(facts_of(block))
+    return found
+
+
+def _role(facts: Facts) -> Role:
+    defined = {each.name for each in facts.definitions} | {each.name for each in facts.assigned}
+    names = {each.name for each in facts.names if not vocabulary.kind_of(each.name)}
+    kind = "tied"
+    if all(each.name.name in _GENERAL for each in facts.blocks) and not facts.is_broken:
+        if not facts.definitions:
+            kind = "general"
+        elif not facts.blocks and all(_is_shared(each, names - defined) for each in facts.definitions):
+            kind = "shared"
+    return Role(kind, frozenset(names), frozenset(defined))
+
+
+def _is_shared(definition: Any, read: set[str]) -> bool:
+    if isinstance(definition.node, syntax.Texture):
+        return False  # it may read parameters
+    return definition.kind in _SHARED or (definition.kind == "transformation" and not read)
+
+
+@dataclass(eq=False)
+class Part:
+    """``blocks`` are its own; ``outcome`` is what checking it gave, None while that is due."""
+
+    blocks: list[Block]
+    outcome: Any = field(default=None, repr=False)
+
+
+class Parts:
+    """The parts of one scene, kept up to date."""
+
+    def __init__(self) -> None:
+        self.users: dict[str, dict[Block, None]] = {}
+        self.shared: dict[str, dict[Block, None]] = {}  # shared blocks by the names that they define
+        self.general: dict[Block, None] = {}
+        self.base = Part([])
+        self._part_of: dict[Block, Part] = {}
+
+    def __iter__(self) -> Iterator[Part]:
+        yield self.base
+        yield from dict.fromkeys(self._part_of.values())
+
+    def change(self, removed: Iterable[Block], added: Iterable[Block]) -> None:
+        """Blocks went and came; parts that this touches lose their outcome or are made anew."""
+        seeds: dict[Block, None] = {}
+        names: set[str] = set()
+        for block in removed:
+            self._unlink(block)
+            names |= role_of(block).names | role_of(block).defined
+            self._dissolve(block, seeds)
+        for block in added:
+            self._link(block)
+            names |= role_of(block).names | role_of(block).defined
+            seeds[block] = None
+        if any(role_of(block).kind == "general" for block in (*removed, *added)):
+            for part in self:
+                part.outcome = None
+        for block in self._depending(name for block in (*removed, *added) for name in role_of(block).defined):
+            if block in self.general:
+                for part in self:
+                    part.outcome = None
+            self._dissolve(block, seeds)
+        for name in names:  # what becomes unused, or used
+            for block in self.shared.get(name, ()):
+                self._dissolve(block, seeds)
+                seeds[block] = None
+        for block in removed:
+            seeds.pop(block, None)
+        self._gather(seeds)
+
+    def _link(self, block: Block) -> None:
+        role = role_of(block)
+        for name in role.names | role.defined:
+            self.users.setdefault(name, {})[block] = None
+        if role.kind == "shared":
+            for name in role.defined:
+                self.shared.setdefault(name, {})[block] = None
+        elif role.kind == "general":
+            self.general[block] = None
+
+    def _unlink(self, block: Block) -> None:
+        role = role_of(block)
+        for table, names in ((self.users, role.names | role.defined), (self.shared, role.defined)):
+            for name in names:
+                if (blocks := table.get(name)) is not None:
+                    blocks.pop(block, None)
+                    if not blocks:
+                        del table[name]
+        self.general.pop(block, None)
+
+    def _dissolve(self, block: Block, seeds: dict[Block, None]) -> None:
+        """Let the part of ``block`` go; its blocks have to be put together again."""
+        part = self._part_of.get(block)
+        for each in part.blocks if part is not None else ():
+            self._part_of.pop(each, None)
+            seeds[each] = None
+
+    def _depending(self, names: Iterable[str]) -> Iterator[Block]:
+        """The blocks that use one of ``names``, or a shared block that does."""
+        queue, seen = list(names), set()
+        while queue:
+            for block in self.users.get(queue.pop(), ()):
+                if block not in seen:
+                    seen.add(block)
+                    yield block
+                    if role_of(block).kind == "shared":
+                        queue += role_of(block).defined
+
+    def _gather(self, seeds: dict[Block, None]) -> None:
+        while seeds:
+            block = seeds.popitem()[0]
+            kind = role_of(block).kind
+            if kind == "tied" and block not in self._part_of:
+                blocks = self._tied(block)
+                part = Part(blocks)
+                self._part_of.update(dict.fromkeys(blocks, part))
+            elif kind == "shared" and all(len(self.users.get(name, ())) < 2 for name in role_of(block).defined):
+                self._part_of[block] = Part([block])
+
+    def _tied(self, block: Block) -> list[Block]:
+        found, queue, names = {block: None}, [block], set()
+        while queue:
+            role = role_of(queue.pop())
+            for name in (role.names | role.defined) - names:
+                names.add(name)
+                if name not in self.shared:
+                    new = [each for each in self.users.get(name, ()) if each not in found and role_of(each).kind == "tied"]
+                    found.update(dict.fromkeys(new))
+                    queue += new
+        return list(found)
+
+    def needed(self, part: Part) -> dict[Block, None]:
+        """The general blocks, and the shared blocks that they or ``part`` need."""
+        found = dict(self.general)
+        queue = [*part.blocks, *found]
+        while queue:
+            for name in role_of(queue.pop()).names:
+                for block in self.shared.get(name, ()):
+                    if block not in found:
+                        found[block] = None
+                        queue.append(block)
+        return {block: None for block in found if block not in part.blocks}
