@@ -54,6 +54,15 @@ def save_messages(code: str, messages: str) -> None:
     path.write_bytes(f"{head}==== messages\n{messages}{rest}".encode(errors="surrogateescape"))
 
 
+def save_fixes(code: str, fixes: dict[str, str]) -> None:
+    """Put ``fixes`` by title into the fixture's file."""
+    path = FOLDER / f"{code}.txt"
+    text = path.read_bytes().decode(errors="surrogateescape").split("==== fix ")[0]
+    for title, after in fixes.items():
+        text += f"==== fix {title}\n{after}"
+    path.write_bytes(text.encode(errors="surrogateescape"))
+
+
 def found(scene: str, patient: bool = False) -> list[Diagnostic]:
     """What `plsys check` says about a scene; the forecast gives up early unless ``patient``."""
     source = Source("scene.plsys", scene.encode(errors="surrogateescape"), SCENE)
