@@ -167,7 +167,7 @@ static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
     const double asked = scene->options.detail;
     const bool needed = scene->accel->states || asked > 0.0, may_be_lazy = scene->accel == &pl_accel_bvh && !(asked > 0.0);
     if (!pl_states_build(states, scene->program, scene->meshes, scene->accel->node_boxes, limit,
-                         may_be_lazy ? MOST_STATES : 0, needed && !may_be_lazy ? error : &ignored)) {
+                         may_be_lazy || !needed ? MOST_STATES : 0, needed && !may_be_lazy ? error : &ignored)) {
         if (may_be_lazy && ignored.code == PL_ERROR_LIMIT && strcmp(ignored.place, "states") == 0) {
             scene->accel = &pl_accel_lazy;
             return true;
