@@ -117,9 +117,9 @@ class Document:
                 found.append((Place(self, base + node.path.span.start, base + node.path.span.end), path))
         return found
 
-    def outline(self) -> Iterator[Outline]:
-        """Definitions and scene blocks in text order."""
-        for block, base in zip(self.text.blocks, self.text.starts):
+    def outline(self, first: int = 0, end: int | None = None) -> Iterator[Outline]:
+        """Definitions and scene blocks in text order; of the blocks from number ``first`` up to ``end``."""
+        for block, base in zip(self.text.blocks[first:end], self.text.starts[first:end]):
             for node in facts_of(block).file.definitions:
                 if isinstance(node, syntax.Include):
                     continue

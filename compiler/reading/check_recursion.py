@@ -111,6 +111,8 @@ def _check_cycle(
     """A cycle that can be left: does something change on the way round that its guards look at?"""
     seed = seed_of(model)
     back = _ways_back(members, component, seed)
+    if not back:
+        return  # all ways round are flattened to nothing
     drawing = [
         (symbol, way) for symbol, way in back if way.weights or any(draws(test) for test, _ in way.guards)
     ]

@@ -5,8 +5,10 @@ Example: a Selection over lines 3 to 9 folds to its line 3; the comment lines be
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from typing import Any, Iterator
 
+from plsys.compiler.analysis import Block, facts_of
 from plsys.lsp.request import Feature, Request
 
 BODIES = frozenset(("block_body", "selection_body", "statements", "inline"))
@@ -22,10 +24,10 @@ def folding_ranges(request: Request) -> list[dict[str, Any]]:
             found.append({"startLine": comment[0], "endLine": comment[1], "kind": "comment"})
         comment.clear()
 
-    for root, base, _ in request.document.trees():
-        for node in _foldable(root):
-            first, last = text.line_of(base + node.start_byte), text.line_of(base + node.end_byte)
-            if node.type == "comment":
+    for block, base in zip(text.blocks, text.first_lines):
+        for first, last, is_comment in _folds(block):
+            first, last = base + first, base + last
+            if is_comment:
                 if comment and first == comment[1] + 1:
                     comment[1] = last
                 else:
@@ -37,6 +39,19 @@ def folding_ranges(request: Request) -> list[dict[str, Any]]:
                     found.append({"startLine": first, "endLine": last})
     end_comment()
     return found
+
+
+def _folds(block: Block) -> list[tuple[int, int, bool]]:
+    """First and last line of what can be folded, counted from the block's first line, and whether it is a comment; kept
+    with the block."""
+    kept = block.__dict__.get("folds")
+    if kept is None:
+        starts = block.line_starts
+        kept = block.__dict__["folds"] = [
+            (bisect_right(starts, node.start_byte) - 1, bisect_right(starts, node.end_byte) - 1, node.type == "comment")
+            for node in _foldable(facts_of(block).tree.root_node)
+        ]
+    return kept
 
 
 def _foldable(node: Any) -> Iterator[Any]:
