@@ -41,7 +41,7 @@ class Dispatcher:
         self.session = Session(self.send, self._wake)
         self.inbox: deque[Any] = deque()
         self.cancelled: set[Any] = set()
-        self._scheduled = False
+        self._scheduled = self._has_opened = False
         self._pause: asyncio.TimerHandle | None = None
 
     def deliver(self, body: bytes) -> None:
@@ -87,6 +87,10 @@ class Dispatcher:
             self._handle(self.inbox.popleft())
         elif self.session.has_work:
             self.session.work()
+            if self._has_opened and not self.session.has_work:
+                # A large file is many objects that stay; searching them for garbage takes longer than a key may.
+                gc.freeze()
+                self._has_opened = False
             if self._pause is not None:
                 self._pause.cancel()
             self._pause = asyncio.get_running_loop().call_later(PAUSE_S, self.session.start_checks)
@@ -103,8 +107,7 @@ class Dispatcher:
             return
         self.session.receive(message)
         if isinstance(message, dict) and message.get("method") == "textDocument/didOpen":
-            # A large file is many objects that stay; searching them for garbage takes longer than a key may.
-            gc.freeze()
+            self._has_opened = True
 
     def send(self, message: dict) -> None:
         try:

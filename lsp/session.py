@@ -34,7 +34,7 @@ NOT_INITIALIZED, REQUEST_CANCELLED, CONTENT_MODIFIED = -32002, -32800, -32801
 
 # How long work() may go on before waiting messages are looked at, in seconds; and how often diagnostics are published
 # while it isn't done. The first ones are published at once.
-SLICE = 0.006
+SLICE = 0.004
 PUBLISH_S = 0.1
 
 # What is answered while a long file is being opened, as far as it is known; other requests wait until all of it is read.

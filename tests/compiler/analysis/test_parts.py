@@ -75,7 +75,9 @@ def test_what_was_found_before_is_as_good_as_new(seed):
         scene.work()
         before = snapshot = Snapshot.of(scene, number, before)
         work.run(snapshot.request, lambda answer: Result(snapshot, answer).apply())
-        assert told(scene, document) == compiled(text)
+        found, expected = set(told(scene, document)), set(compiled(text))
+        # The compiler stops at errors of names; an editor goes on with the parts that have none.
+        assert found >= expected if any(code == "duplicate-name" for code, *_ in expected) else found == expected
 
 
 def test_an_edit_is_checked_with_its_own_part():
