@@ -359,7 +359,8 @@ static bool find_depth_limit(filling *f)
     return ok || pl_fail_memory(f->error, "building the grid");
 }
 
-/* Lays the grid around the scene; false: an error. A flat scene gets some height. */
+/* Lays the grid around the scene, with some height around a flat one. There is none where the squares of distances
+ * would leave the range of numbers. */
 static void lay_out(const pl_scene *scene, pl_grid *grid)
 {
     const pl_box *box = &scene->states.list[0].box;
@@ -367,7 +368,7 @@ static void lay_out(const pl_scene *scene, pl_grid *grid)
     if (pl_box_is_empty(box) || !pl_box_is_finite(box)) return;
     for (int axis = 0; axis < 3; axis++) widest = fmax(widest, box->hi[axis] - box->lo[axis]);
     widest = fmax(widest, 1e-9 * pl_box_reach(box));
-    if (!(widest > 0.0 && isfinite(widest))) return;
+    if (!(widest > 1e-150 && widest < 1e150)) return;
     double pad = 1e-3 * widest;
     grid->margin = 0.5 * pad;
     for (int axis = 0; axis < 3; axis++) {
