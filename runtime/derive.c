@@ -195,8 +195,7 @@ static bool compute_transform(pl_walk *walk, uint32_t node, pl_error *error)
 {
     const pl_node *it = &walk->program->nodes[node];
     if (!pl_run(walk->program, node, it->as.transform_code.code, &walk->scope, &walk->result, error)) return false;
-    walk->computed.to_parent = walk->result.matrix;
-    walk->computed.singular = !pl_affine_inverse(&walk->computed.to_parent, &walk->computed.to_object);
+    pl_transform_set(&walk->computed, &walk->result.matrix);
     if (walk->stretches) walk->computed.stretch = pl_largest_stretch(&walk->computed.to_parent);
     walk->transform = &walk->computed;
     return true;

@@ -51,8 +51,10 @@ static bool describe(pl_tracer *tracer, const pl_hits *out, size_t i, const pl_r
     if (out->primitive && !pl_trace_number(tracer, hit, error)) return false;
     if (out->t) out->t[i] = hit->t;
     if (out->bound) out->bound[i] = hit->bound;
-    if (out->primitive)
-        out->primitive[i] = !found ? -1 : hit->primitive > INT64_MAX ? INT64_MAX : (int64_t)hit->primitive;
+    if (out->primitive) {
+        uint64_t primitive = found ? pl_trace_primitive(tracer, hit) : 0;
+        out->primitive[i] = !found ? -1 : primitive > INT64_MAX ? INT64_MAX : (int64_t)primitive;
+    }
     if (out->symbol) out->symbol[i] = surface.symbol;
     if (out->rule) out->rule[i] = surface.rule;
     if (out->depth) out->depth[i] = surface.depth;

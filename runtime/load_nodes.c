@@ -66,10 +66,8 @@ static uint32_t read_matrix(pl_reader *r, pools *p)
             matrix.m[i] = r->program->constants[constant];
     }
     if (p->store && !r->failed) {
-        pl_transform *transform = &p->transforms[p->transform_count];
-        transform->to_parent = matrix;
-        transform->singular = !pl_affine_inverse(&matrix, &transform->to_object);
-        transform->stretch = pl_largest_stretch(&matrix);
+        pl_transform_set(&p->transforms[p->transform_count], &matrix);
+        p->transforms[p->transform_count].stretch = pl_largest_stretch(&matrix);
     }
     return p->transform_count++;
 }

@@ -60,7 +60,22 @@ typedef struct pl_transform {
     pl_affine to_object; /* the inverse; unspecified if singular */
     double stretch;      /* the largest singular value of to_parent, rounded up; set where detail cut-offs need it */
     bool singular;       /* the subtree below is to be dropped and counted */
+    uint8_t form;        /* pl_form of to_object */
 } pl_transform;
+
+/* What of a map isn't trivial: rays through a translation or a scaling take less arithmetic. */
+typedef enum pl_form { PL_FORM_GENERAL, PL_FORM_DIAGONAL, PL_FORM_TRANSLATION } pl_form;
+
+/* Sets to_parent and all that follows from it. */
+static inline void pl_transform_set(pl_transform *transform, const pl_affine *to_parent)
+{
+    transform->to_parent = *to_parent;
+    transform->singular = !pl_affine_inverse(to_parent, &transform->to_object);
+    const double *m = transform->to_object.m;
+    transform->form = PL_FORM_GENERAL;
+    if (!transform->singular && m[1] == 0.0 && m[2] == 0.0 && m[4] == 0.0 && m[6] == 0.0 && m[8] == 0.0 && m[9] == 0.0)
+        transform->form = m[0] == 1.0 && m[5] == 1.0 && m[10] == 1.0 ? PL_FORM_TRANSLATION : PL_FORM_DIAGONAL;
+}
 
 /* Settings, camera, light or texture: PL_<RECORD>_VALUES numbers, then PL_<RECORD>_ENTRY numbers an entry. What the
  * file doesn't set has its default; in entries that is 0. */

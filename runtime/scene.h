@@ -28,9 +28,9 @@ struct pl_scene {
     pl_statistics statistics;
 };
 
-/* Growing array of inverse transformations, from the root to a leaf. */
+/* Growing array of transformations, from the root to a leaf. */
 typedef struct pl_chain {
-    pl_affine *list;
+    pl_transform *list;
     size_t count, capacity;
 } pl_chain;
 

@@ -371,8 +371,10 @@ static bool find_first(pl_shader *shader, const pl_ray *ray, pl_surface *surface
     if (!first) return true;
     if (!pl_trace_number(shader->tracer, &shader->hit, error)) return false;
     first->t = shader->hit.t;
-    first->primitive = shader->hit.primitive;
-    if (first->t != INFINITY) first->surface = *surface;
+    if (first->t != INFINITY) {
+        first->primitive = pl_trace_primitive(shader->tracer, &shader->hit);
+        first->surface = *surface;
+    }
     first->box_tests = counters->box_tests - box_tests;
     first->miss_depth = counters->miss_depth;
     return true;

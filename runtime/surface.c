@@ -13,9 +13,8 @@
 /* How far below a cut instance its first primitive is looked for. */
 enum { CUT_DEPTH = 64, CUT_STEPS = 4096 };
 
-/* A point and direction in the frame at hand, and what finishing needs of the leaf. */
+/* What is needed of a leaf. */
 typedef struct leaf_surface {
-    const double *o, *d;
     const pl_shape *shape; /* NULL: a mesh */
     const pl_mesh_tree *mesh;
     const double *arguments;
@@ -28,12 +27,12 @@ static bool remember(pl_chain *chain, const pl_transform *transform, pl_error *e
 {
     if (chain->count == chain->capacity) {
         size_t capacity = chain->capacity ? 2 * chain->capacity : 32;
-        pl_affine *list = realloc(chain->list, capacity * sizeof *list);
+        pl_transform *list = realloc(chain->list, capacity * sizeof *list);
         if (!list) return pl_fail_memory(error, "shading a hit");
         chain->list = list;
         chain->capacity = capacity;
     }
-    chain->list[chain->count++] = transform->to_object;
+    chain->list[chain->count++] = *transform;
     return true;
 }
 
@@ -54,35 +53,39 @@ static bool take_texture(pl_tracer *tracer, double t, pl_surface *surface, pl_er
     return pl_run(program, tracer->walk.node, node->as.texture.code, &tracer->walk.scope, &tracer->walk.result, error);
 }
 
-/* The normal at the leaf, mapped back by the chain of inverse transposes, with its length kept in range, so that no scale
- * however deep overflows (paper, section 2: only the foremost hit's normal is transformed back). */
-static void map_normal_back(const pl_tracer *tracer, double n[3])
+/* A normal above a transformation: by the inverse transpose (paper, section 2: only the foremost hit's normal is
+ * transformed back). Its length is kept in range, so that no scale however deep overflows. */
+static void map_normal_back(const pl_transform *transform, double n[3])
 {
-    for (size_t i = tracer->chain.count + 1; i-- > 0;) {
-        double size = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
-        if (!(size > 0x1p-200 && size < 0x1p200))
-            for (int axis = 0; axis < 3; axis++) n[axis] /= size;
-        if (i > 0) pl_affine_normal(&tracer->chain.list[i - 1], n, n);
-    }
+    const double *m = transform->to_object.m;
+    if (transform->form == PL_FORM_TRANSLATION) return;
+    if (transform->form == PL_FORM_GENERAL) pl_affine_normal(&transform->to_object, n, n);
+    else
+        for (int axis = 0; axis < 3; axis++) n[axis] *= m[5 * axis];
+    double size = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
+    if (size > 0x1p-200 && size < 0x1p200) return;
+    for (int axis = 0; axis < 3; axis++) n[axis] /= size;
+}
+
+/* Sets the normal in the leaf's own frame. */
+static void begin_normal(const leaf_surface *leaf, const pl_hit *hit, double n[3])
+{
+    if (leaf->mesh) pl_mesh_normal(leaf->mesh, hit->part, hit->local, n);
+    else leaf->shape->normal(leaf->arguments, hit->part, hit->local, n);
+}
+
+static void finish_surface(const pl_scene *scene, const leaf_surface *leaf, const pl_ray *ray, const pl_hit *hit,
+                           pl_surface *surface)
+{
+    double *n = surface->normal;
     double size = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
     for (int axis = 0; axis < 3; axis++) n[axis] /= size;
     double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    for (int axis = 0; axis < 3; axis++) n[axis] /= length;
-}
-
-static void finish_surface(pl_tracer *tracer, const leaf_surface *leaf, const pl_ray *ray, const pl_hit *hit,
-                           pl_surface *surface)
-{
-    double local[3];
     for (int axis = 0; axis < 3; axis++) {
-        local[axis] = leaf->o[axis] + hit->t * leaf->d[axis];
+        n[axis] /= length;
         surface->point[axis] = ray->origin[axis] + hit->t * ray->direction[axis];
     }
-    if (leaf->mesh) pl_mesh_normal(leaf->mesh, hit->part, local, surface->normal);
-    else leaf->shape->normal(leaf->arguments, hit->part, local, surface->normal);
-    map_normal_back(tracer, surface->normal);
-    const pl_program *program = tracer->scene->program;
-    surface->symbol = leaf->symbol == UINT32_MAX ? -1 : (int32_t)program->nodes[leaf->symbol].symbol;
+    surface->symbol = leaf->symbol == UINT32_MAX ? -1 : (int32_t)scene->program->nodes[leaf->symbol].symbol;
     surface->rule = leaf->rule;
     surface->depth = (int32_t)leaf->depth;
 }
@@ -154,7 +157,7 @@ static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit
     begin_surface(tracer, ray, hit, surface);
     memcpy(o, ray->origin, 3 * sizeof *o);
     memcpy(d, ray->direction, 3 * sizeof *d);
-    leaf_surface leaf = {.o = o, .d = d};
+    leaf_surface leaf = {0};
     for (bool found = false; !found;) {
         switch (pl_walk_next(walk, error)) {
         case PL_EVENT_ERROR: return false;
@@ -185,7 +188,9 @@ static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit
     leaf.symbol = walk->at.symbol;
     leaf.rule = walk->at.rule;
     leaf.depth = walk->at.depth;
-    finish_surface(tracer, &leaf, ray, hit, surface);
+    begin_normal(&leaf, hit, surface->normal);
+    for (size_t i = tracer->chain.count; i-- > 0;) map_normal_back(&tracer->chain.list[i], surface->normal);
+    finish_surface(tracer->scene, &leaf, ray, hit, surface);
     return true;
 }
 
@@ -201,43 +206,45 @@ static int64_t innermost_texture(const pl_items *items, bool *code)
     return innermost;
 }
 
-/* By the items on the path; `textured` is the one with the innermost texture. */
-static bool items_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, const pl_items *items,
-                          int64_t textured, pl_surface *surface, pl_error *error)
+/* The texture of item `textured`, and the hit point in the frame where it stands. */
+static void take_items_texture(const pl_scene *scene, const pl_ray *ray, const pl_hit *hit, const pl_items *items,
+                               size_t textured, pl_surface *surface)
 {
-    const pl_scene *scene = tracer->scene;
+    const pl_node *node = &scene->program->nodes[items->list[textured]->texture];
+    const pl_record *record = &scene->program->records[node->as.texture.texture];
     double o[3], d[3];
-    leaf_surface leaf = {.o = o, .d = d, .symbol = UINT32_MAX, .rule = -1};
     memcpy(o, ray->origin, sizeof o);
     memcpy(d, ray->direction, sizeof d);
-    begin_surface(tracer, ray, hit, surface);
-    for (size_t i = 0; i < items->count; i++) {
+    for (size_t i = 0; i <= textured; i++) {
         const pl_item *item = items->list[i];
-        for (uint32_t k = 0; k <= item->transform_count; k++) {
-            if ((int64_t)i == textured && k == item->texture_transforms)
-                for (int axis = 0; axis < 3; axis++) surface->pattern_point[axis] = o[axis] + hit->t * d[axis];
-            if (k == item->transform_count) break;
-            pl_map_ray(item->transforms[k], o, d);
-            if (!remember(&tracer->chain, item->transforms[k], error)) return false;
-        }
-        if (item->rule >= 0) leaf.rule = item->rule;
-        if (item->kind == PL_NODE_ENTER) {
-            leaf.symbol = scene->states.list[item->what].symbol;
-            leaf.depth++;
-        }
+        uint32_t count = i == textured ? item->texture_transforms : item->transform_count;
+        for (uint32_t k = 0; k < count; k++) pl_map_ray(item->transforms[k], o, d);
     }
-    if (textured >= 0) {
-        const pl_node *node = &scene->program->nodes[items->list[textured]->texture];
-        const pl_record *record = &scene->program->records[node->as.texture.texture];
-        surface->texture = record->values;
-        surface->entries = record->entries;
-    }
+    for (int axis = 0; axis < 3; axis++) surface->pattern_point[axis] = o[axis] + hit->t * d[axis];
+    surface->texture = record->values;
+    surface->entries = record->entries;
+}
+
+/* By the items on the path. */
+static void items_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, const pl_items *items,
+                          int64_t textured, pl_surface *surface)
+{
+    const pl_scene *scene = tracer->scene;
     const pl_item *last = items->list[items->count - 1];
-    leaf.arguments = last->arguments;
+    leaf_surface leaf = {.arguments = last->arguments, .symbol = UINT32_MAX, .rule = -1};
     if (last->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[last->what];
     else leaf.shape = pl_shape_of(last->what);
-    finish_surface(tracer, &leaf, ray, hit, surface);
-    return true;
+    begin_surface(tracer, ray, hit, surface);
+    begin_normal(&leaf, hit, surface->normal);
+    for (size_t i = items->count; i-- > 0;) {
+        const pl_item *item = items->list[i];
+        for (uint32_t k = item->transform_count; k-- > 0;) map_normal_back(item->transforms[k], surface->normal);
+        if (leaf.rule < 0) leaf.rule = item->rule;
+        if (item->kind != PL_NODE_ENTER) continue;
+        if (leaf.depth++ == 0) leaf.symbol = scene->states.list[item->what].symbol;
+    }
+    if (textured >= 0) take_items_texture(scene, ray, hit, items, (size_t)textured, surface);
+    finish_surface(scene, &leaf, ray, hit, surface);
 }
 
 bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface, pl_error *error)
@@ -247,7 +254,10 @@ bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, p
     if (!accel->items) return walk_surface(tracer, ray, hit, &hit->path, surface, error);
     if (!accel->items(tracer->scene, &hit->trail, &tracer->items)) return pl_fail_memory(error, "shading a hit");
     int64_t textured = innermost_texture(&tracer->items, &code);
-    if (!code) return items_surface(tracer, ray, hit, &tracer->items, textured, surface, error);
+    if (!code) {
+        items_surface(tracer, ray, hit, &tracer->items, textured, surface);
+        return true;
+    }
     if (!pl_items_path(&tracer->items, &tracer->scratch)) return pl_fail_memory(error, "shading a hit");
     return walk_surface(tracer, ray, hit, &tracer->scratch, surface, error);
 }

@@ -80,11 +80,17 @@ static pl_query begin_query(pl_tracer *tracer, const pl_ray *ray, pl_query_kind 
                       .error = error};
 }
 
-/* Accelerators that skip without counting leave the primitive's index to be found from the path. */
-static void number_primitive(const pl_tracer *tracer, pl_hit *hit)
+uint64_t pl_trace_primitive(pl_tracer *tracer, const pl_hit *hit)
 {
-    if (tracer->scene->accel->node_boxes || tracer->scene->states.cuts)
-        hit->primitive = pl_states_locate(&tracer->scene->states, &hit->path, hit->cut_depth);
+    const pl_scene *scene = tracer->scene;
+    uint64_t primitive = 0;
+    if (scene->accel->node_boxes || scene->states.cuts)
+        return pl_states_locate(&scene->states, &hit->path, hit->cut_depth);
+    if (!scene->accel->items) return hit->primitive;
+    if (!scene->accel->items(scene, &hit->trail, &tracer->items)) return UINT64_MAX;
+    for (size_t i = 0; i < tracer->items.count; i++)
+        primitive = pl_add_saturating(primitive, tracer->items.list[i]->first);
+    return primitive;
 }
 
 bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_error *error)
@@ -98,7 +104,6 @@ bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_erro
         hit->t = INFINITY;
         return false;
     }
-    if (query.found) number_primitive(tracer, hit);
     if (query.found && hit->cut_depth) {
         tracer->counters.cuts++;
         tracer->counters.cut_error = fmax(tracer->counters.cut_error, hit->bound * query.length);
@@ -127,7 +132,6 @@ bool pl_trace_all(pl_tracer *tracer, const pl_ray *ray, bool (*visit)(void *cont
     if (!tracer->scene->accel->trace(tracer, ray, &query)) return false;
     pl_hit_list_sort(tracer->list);
     for (size_t i = 0; i < tracer->list->count; i++) {
-        number_primitive(tracer, &tracer->list->hits[i]);
         if (!visit(context, &tracer->list->hits[i])) break;
     }
     return true;

@@ -29,8 +29,9 @@ typedef struct pl_hit {
     double t;           /* INFINITY: none */
     double bound;       /* error bound of t; NaN until known */
     uint32_t cut_depth; /* 0: a primitive; else symbols entered to the instance drawn as its state's box (cut.h) */
-    uint64_t primitive; /* index in derivation order */
+    uint64_t primitive; /* index in derivation order, where the accelerator counts: ask pl_trace_primitive */
     int32_t part;       /* of the shape: a face, or a mesh's triangle */
+    double local[3];    /* the point in the shape's own frame */
     pl_path path;       /* where the accelerator has no trail */
     pl_path trail;      /* the accelerator's own way to the leaf (accel.h); the path follows from it */
 } pl_hit;
@@ -64,6 +65,9 @@ int pl_trace_any(pl_tracer *tracer, const pl_ray *ray, pl_error *error);
  * transparent things. A solid gives each of its roots. false: an error. */
 bool pl_trace_all(pl_tracer *tracer, const pl_ray *ray, bool (*visit)(void *context, const pl_hit *hit), void *context,
                   pl_error *error);
+
+/* The index of a hit's primitive in derivation order. */
+uint64_t pl_trace_primitive(pl_tracer *tracer, const pl_hit *hit);
 
 bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface, pl_error *error);
 

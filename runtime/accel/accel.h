@@ -52,12 +52,13 @@ typedef struct pl_leaf {
     bool (*path)(const void *source, pl_path *path); /* NULL: there is a trail */
     bool (*trail)(const void *source, pl_path *trail);
     const void *source;
+    const double *o, *d; /* the ray in its frame */
     uint32_t cut_depth; /* 0, but for a cut instance (pl_query_cut) */
     double bound;
 } pl_leaf;
 
-/* Offers a leaf; o, d: the ray in its frame. false: an error. */
-bool pl_query_leaf(pl_query *query, const pl_leaf *leaf, const double o[3], const double d[3]);
+/* Offers a leaf. false: an error. */
+bool pl_query_leaf(pl_query *query, const pl_leaf *leaf);
 
 /* An instance that a ray comes to in a scene with cut-offs. */
 typedef struct pl_arrival {
@@ -101,11 +102,21 @@ bool pl_items_path(const pl_items *items, pl_path *path);
 
 extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh, pl_accel_gated, pl_accel_grid, pl_accel_lazy;
 
-/* One step of the normative chain. */
+/* One step of the normative chain. The arithmetic follows the form of the map, which is a fact of its numbers. */
 static inline void pl_map_ray(const pl_transform *transform, double o[3], double d[3])
 {
-    pl_affine_point(&transform->to_object, o, o);
-    pl_affine_vector(&transform->to_object, d, d);
+    const double *m = transform->to_object.m;
+    if (transform->form == PL_FORM_GENERAL) {
+        pl_affine_point(&transform->to_object, o, o);
+        pl_affine_vector(&transform->to_object, d, d);
+        return;
+    }
+    if (transform->form == PL_FORM_DIAGONAL)
+        for (int axis = 0; axis < 3; axis++) {
+            o[axis] *= m[5 * axis];
+            d[axis] *= m[5 * axis];
+        }
+    for (int axis = 0; axis < 3; axis++) o[axis] += m[4 * axis + 3];
 }
 
 #endif

@@ -51,61 +51,6 @@ bool pl_bvh_grow_stack(pl_bvh_work *w, size_t top, pl_error *error)
     return grow(&w->stack, top + 64, &w->stack_capacity, sizeof *w->stack, error);
 }
 
-/* --- entering an instance --- */
-
-/* A ray that can't be told in single precision meets everything. */
-static void give_up_filtering(pl_frame *f, double t_min)
-{
-    f->t0 = t_min;
-    f->rate = 0.0;
-    f->slack = 1e30f;
-    for (int axis = 0; axis < 3; axis++) {
-        f->origin[axis] = f->direction[axis] = 0.0f;
-        f->inverse[axis] = 1.0f;
-    }
-}
-
-/* In the unit frame a hit lies outside its exact box by no more than `slack`: the rounding of the chain below (reach.h,
- * twice: boxes here are composed too), of the ray above (error), of moving to t0; and of single precision, where all
- * numbers are about 1: 2^-19 is some 30 roundings. */
-bool pl_frame_begin(pl_frame *f, double t_min, double t_max)
-{
-    const pl_front *front = f->front;
-    double distance = sqrt(f->o[0] * f->o[0] + f->o[1] * f->o[1] + f->o[2] * f->o[2]);
-    double slack = f->error + DBL_EPSILON * (2.0 * (front->reach.gain * distance + front->reach.base) +
-                                             16.0 * (distance + front->reach.size));
-    pl_slab slab = pl_slab_of(f->o, f->d, slack);
-    f->mapped = false;
-    if (front->root == PL_NOTHING || !pl_slab_hits(&slab, &front->box, t_min, t_max, &f->t0)) {
-        give_up_filtering(f, t_min);
-        return false;
-    }
-    double largest = fmax(fabs(f->d[0]), fmax(fabs(f->d[1]), fabs(f->d[2])));
-    double origin[3], most = 0.0;
-    f->rate = largest * front->scale;
-    for (int axis = 0; axis < 3; axis++) {
-        origin[axis] = (f->o[axis] + f->t0 * f->d[axis] - front->centre[axis]) * front->scale;
-        most += fabs(origin[axis]);
-    }
-    double unit_slack = 1.001 * slack * front->scale + 0x1p-19 * (1.0 + most);
-    if (!(f->rate > 1e-200 && f->rate < 1e200 && unit_slack < 1e6)) {
-        give_up_filtering(f, t_min);
-        return true;
-    }
-    f->slack = (float)unit_slack;
-    double shrink = 1.0 / largest;
-    for (int axis = 0; axis < 3; axis++) {
-        f->origin[axis] = (float)origin[axis];
-        /* A direction that hardly moves along an axis still has an inverse: within the front it moves by less than
-         * the slack either way. */
-        float d = (float)(f->d[axis] * shrink);
-        if (!(fabsf(d) > 1e-18f)) d = copysignf(1e-18f, d);
-        f->direction[axis] = d;
-        f->inverse[axis] = 1.0f / d;
-    }
-    return true;
-}
-
 /* --- candidates --- */
 
 /* Maps a ray from a front's state to an item of an opened node, one transformation after another. */
@@ -113,10 +58,10 @@ static bool map_down(pl_bvh_work *w, const pl_front *front, uint32_t opened, con
                      double d[3], pl_error *error)
 {
     size_t count = 0;
-    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent]) {
+    for (uint32_t at = front->opened[opened].moved; at; at = front->opened[front->opened[at].parent].moved) {
         if (count >= w->chain_capacity && !grow(&w->chain, count + 1, &w->chain_capacity, sizeof *w->chain, error))
             return false;
-        w->chain[count++] = at->item;
+        w->chain[count++] = front->opened[at].item;
     }
     while (count > 0) {
         const pl_item *at = w->chain[--count];
@@ -126,15 +71,10 @@ static bool map_down(pl_bvh_work *w, const pl_front *front, uint32_t opened, con
     return true;
 }
 
-static const pl_item *item_of(const pl_scene *scene, const pl_front *front, uint32_t opened, uint32_t item)
-{
-    return &scene->states.list[front->opened[opened].state].items[item & ~PL_NO_SHADOW];
-}
-
 static const pl_item *instance_item(const pl_scene *scene, const pl_front *front, uint32_t instance)
 {
     const pl_front_instance *it = &front->instances[instance];
-    return item_of(scene, front, it->opened, it->item);
+    return pl_front_item(&scene->states, front, it->opened, it->item);
 }
 
 /* The normative ray of a frame, from the deepest frame above that has one. */
@@ -181,24 +121,24 @@ bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *q
     pl_frame *f = &w->frames[frame];
     const pl_front *front = f->front;
     const pl_front_primitive *primitive = &front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = item_of(scene, front, primitive->opened, primitive->item);
+    const pl_item *item = pl_front_item(&scene->states, front, primitive->opened, primitive->item);
     double o[3], d[3];
     if (!f->mapped && !map_frame(scene, w, frame, query->error)) return false;
     memcpy(o, f->normative_o, sizeof o);
     memcpy(d, f->normative_d, sizeof d);
     if (!map_down(w, front, primitive->opened, item, o, d, query->error)) return false;
     place p = {scene, w, frame, ref};
-    uint64_t within = pl_add_saturating(front->opened[primitive->opened].first, item->first);
     pl_leaf leaf = {
         .shape = item->what,
         .arguments = item->arguments,
         .mesh = item->kind == PL_NODE_MESH ? scene->meshes[item->what] : NULL,
-        .primitive = pl_add_saturating(f->first, within),
         .trail = write_trail,
         .source = &p,
+        .o = o,
+        .d = d,
     };
     tracer->counters.primitive_tests++;
-    return pl_query_leaf(query, &leaf, o, d);
+    return pl_query_leaf(query, &leaf);
 }
 
 /* --- from a trail to the items on the path --- */
@@ -232,7 +172,7 @@ static bool trail_items(const pl_scene *scene, const pl_path *trail, pl_items *i
         front = &fronts->list[instance->front];
     }
     const pl_front_primitive *leaf = &front->primitives[trail->terms[trail->length - 1] & PL_REF_INDEX];
-    return add_items(items, front, leaf->opened, item_of(scene, front, leaf->opened, leaf->item));
+    return add_items(items, front, leaf->opened, pl_front_item(&scene->states, front, leaf->opened, leaf->item));
 }
 
 /* --- which kernel --- */

@@ -1,7 +1,6 @@
 /* bvh.h - traversal of fronts: frames, the kernels that filter, and the evaluation of what they leave.
  *
- * kernel.h holds the traversal; kernel_*.c compile it for an instruction set each. bvh.c has what is evaluated in double
- * and doesn't depend on the instruction set: entering an instance, and candidates. */
+ * kernel.h holds the traversal; kernel_*.c compile it for an instruction set each. bvh.c evaluates candidates in double. */
 #ifndef PL_BVH_H
 #define PL_BVH_H
 
@@ -12,12 +11,12 @@
  * path one transformation after another when a candidate needs it. */
 typedef struct pl_frame {
     const pl_front *front;
-    double o[3], d[3], error;
+    double o[4], d[4], error; /* the fourth numbers mean nothing */
+    double distance; /* no less than |o| */
     double t0, rate; /* local t: (t - t0) * rate, where the box begins at 0 and the front's size is about 1 */
-    float origin[3], direction[3], inverse[3]; /* in the unit frame, at t0 */
+    float origin[4], direction[4], inverse[4]; /* in the unit frame, at t0 */
     float slack;     /* no hit lies farther outside its item, in the unit frame */
-    uint32_t instance, depth;
-    uint64_t first;  /* primitives before it */
+    uint32_t instance;
     bool mapped;     /* normative_… are known */
     double normative_o[3], normative_d[3];
 } pl_frame;
@@ -31,9 +30,6 @@ typedef struct pl_bvh_work {
 
 typedef bool pl_bvh_kernel(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
 extern pl_bvh_kernel pl_bvh_trace_scalar, pl_bvh_trace_avx2, pl_bvh_trace_avx512;
-
-/* Begins frame `index` with the ray of frames[index].o and .d; false if it misses the box. */
-bool pl_frame_begin(pl_frame *frame, double t_min, double t_max);
 
 /* Evaluates a primitive of a frame normatively and offers it. false: an error. */
 bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query);

@@ -9,8 +9,8 @@
 
 enum { DEFAULT_CACHE = 1 << 20, LEAST_ITEMS = 21 };
 
-/* A primitive's share of nodes: 5.5 children of a node go out of eight. */
-#define NODE_BYTES_AN_ITEM (sizeof(pl_front_node) / 4.5)
+/* A primitive's share of nodes: 6 of eight children are there, one of them a node. */
+#define NODE_BYTES_AN_ITEM (sizeof(pl_front_node) / 5.0)
 
 /* --- the budget --- */
 
@@ -108,7 +108,7 @@ static void set_frame(pl_front *front, const pl_state *state)
     front->box = state->box;
     front->reach = state->reach;
     memset(front->centre, 0, sizeof front->centre);
-    front->scale = 1.0;
+    front->scale = front->size = 1.0;
     front->framed = false;
     if (pl_box_is_empty(&state->box) || !pl_box_is_finite(&state->box)) return;
     front->framed = true;
@@ -117,6 +117,9 @@ static void set_frame(pl_front *front, const pl_state *state)
         half = fmax(half, 0.5 * state->box.hi[axis] - 0.5 * state->box.lo[axis]);
     }
     if (half > 0.0) front->scale = fmin(1.0 / half, 1e300);
+    front->size = 1.0 / front->scale;
+    for (int axis = 0; axis < 3; axis++)
+        front->half[axis] = (float)((0.5 * state->box.hi[axis] - 0.5 * state->box.lo[axis]) * front->scale);
 }
 
 static void *copy(const void *data, size_t bytes, size_t *total)

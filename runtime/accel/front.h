@@ -44,9 +44,9 @@ typedef struct pl_front_node {
 
 /* A state that stands opened in a front. Node 0 is the front's own state. */
 typedef struct pl_opened {
-    const pl_item *item; /* of the parent's state; NULL: node 0 */
-    uint32_t parent, state;
-    uint64_t first; /* primitives of the front before it, in derivation order */
+    const pl_item *item; /* of the parent's state, and leading to this one; NULL: node 0 */
+    uint32_t parent;
+    uint32_t moved; /* the nearest node from this one up whose item has transformations, or 0 */
 } pl_opened;
 
 typedef struct pl_front_primitive {
@@ -58,12 +58,12 @@ typedef struct pl_front_primitive {
 } pl_front_primitive;
 
 typedef struct pl_front_instance {
-    pl_affine to_object;    /* composed: front's state -> instance's state */
+    double columns[3 * 4 + 1]; /* composed map of points, front's state -> instance's state, column by column; one more
+                                  number is read with the last */
     float stretch;          /* of the error of a ray, through the chain of to_objects … */
     float gain, base;       /* … and what the chain adds, in ulps: gain * |point| + base */
     uint32_t front, opened;
     uint32_t item;          /* | PL_NO_SHADOW */
-    uint32_t depth;         /* symbols entered from the front's state to the instance's */
 } pl_front_instance;
 
 typedef struct pl_front {
@@ -76,12 +76,21 @@ typedef struct pl_front {
     pl_ref root;             /* PL_NOTHING: no bounded items */
     uint32_t state;
     bool framed;             /* its box is finite; else all items are unbounded */
-    double centre[3], scale; /* unit frame: (p - centre) * scale */
+    double centre[4], scale; /* unit frame: (p - centre) * scale */
+    double size;             /* 1 / scale */
+    float half[4];           /* of the box in the unit frame */
     pl_box box;              /* of the bounded items, in the state's frame */
     pl_reach reach;
 } pl_front;
 
 #define PL_NOTHING UINT32_MAX
+
+/* The item of an opened node's state. */
+static inline const pl_item *pl_front_item(const pl_states *states, const pl_front *front, uint32_t opened, uint32_t item)
+{
+    const pl_item *by = front->opened[opened].item;
+    return &states->list[by ? by->what : front->state].items[item & ~PL_NO_SHADOW];
+}
 
 typedef struct pl_fronts {
     pl_front *list; /* 0: the scene */

@@ -31,7 +31,7 @@ typedef struct closed {
     chain at;
     const pl_item *item;
     double area;
-    uint32_t opened, depth;
+    uint32_t opened;
     bool no_shadow;
 } closed;
 
@@ -242,17 +242,18 @@ static bool add_instance(opening *o, const closed *c)
     const pl_state *state = &states->list[c->item->what];
     if (!grow(&items->instances, items->instance_count, &items->instance_capacity, sizeof *items->instances))
         return false;
-    const pl_opened *opened = &items->opened[c->opened];
+    const pl_item *by = items->opened[c->opened].item;
     items->instances[items->instance_count] = (pl_front_instance){
-        .to_object = c->at.to_object,
         .stretch = round_up(c->at.stretch * (1.0 + 0x1p-20)),
         .gain = round_up(c->at.gain),
         .base = round_up(c->at.base),
         .front = c->item->what,
         .opened = c->opened,
-        .item = (uint32_t)(c->item - states->list[opened->state].items) | (c->no_shadow ? PL_NO_SHADOW : 0),
-        .depth = c->depth,
+        .item = (uint32_t)(c->item - states->list[by ? by->what : o->front->state].items) | (c->no_shadow ? PL_NO_SHADOW : 0),
     };
+    for (int r = 0; r < 3; r++)
+        for (int column = 0; column < 4; column++)
+            items->instances[items->instance_count].columns[3 * column + r] = c->at.to_object.m[4 * r + column];
     pl_box box = pl_box_under(states, c->item, &c->at.to_parent);
     return list_item(o, &box, state->unbounded, pl_ref_of(PL_KIND_INSTANCE, (uint32_t)items->instance_count++));
 }
@@ -267,20 +268,19 @@ static bool open_state(opening *o, const closed *c, uint32_t state)
     if (o->items) {
         pl_front_items *items = o->items;
         if (!grow(&items->opened, items->opened_count, &items->opened_capacity, sizeof *items->opened)) return false;
-        uint64_t first = c->item ? pl_add_saturating(items->opened[c->opened].first, c->item->first) : 0;
-        items->opened[items->opened_count++] = (pl_opened){c->item, c->opened, state, first};
+        uint32_t moved = !c->item ? 0 : c->item->transform_count ? opened : items->opened[c->opened].moved;
+        items->opened[items->opened_count++] = (pl_opened){c->item, c->opened, moved};
     }
     for (uint32_t i = 0; i < it->item_count; i++) {
         const pl_item *item = &it->items[i];
         if (pl_item_primitives(states, item) == 0) continue;
-        closed next = {.at = c->at, .item = item, .opened = opened, .depth = c->depth};
+        closed next = {.at = c->at, .item = item, .opened = opened};
         next.no_shadow = c->no_shadow || item->no_shadow;
         chain_append(&next.at, &made->chains[made->first[state] + i]);
         if (item->kind != PL_NODE_ENTER) {
             if (!add_primitive(o, &next.at, item, opened, i, next.no_shadow)) return false;
             continue;
         }
-        next.depth++;
         if (o->ordered) {
             pl_box box = pl_box_map(&next.at.to_parent, &states->list[item->what].box);
             next.area = states->list[item->what].unbounded ? INFINITY : pl_box_area(&box);

@@ -5,6 +5,7 @@
  * most, small ones along all three. */
 #include <pthread.h>
 #include <stdatomic.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -118,15 +119,26 @@ static size_t divide(const group *g, int level)
     }
 }
 
-/* Divides a group into at most eight; returns their number. */
+/* The group with the largest area whose count is in [least, most]; -1: none. */
+static int largest_of(const group groups[], int number, size_t least, size_t most)
+{
+    int largest = -1;
+    for (int i = 0; i < number; i++)
+        if (groups[i].count >= least && groups[i].count <= most &&
+            (largest < 0 || area(&groups[i].box) > area(&groups[largest].box)))
+            largest = i;
+    return largest;
+}
+
+/* Divides a group into at most eight; returns their number. Nodes should be full: what fits into one node is divided
+ * only when nothing larger is left, and then, where there is room, into single boxes. */
 static int split(const group *whole, group groups[PL_FRONT_WIDTH], int level)
 {
     int number = 1;
     groups[0] = *whole;
     while (number < PL_FRONT_WIDTH) {
-        int largest = -1;
-        for (int i = 0; i < number; i++)
-            if (groups[i].count > 1 && (largest < 0 || area(&groups[i].box) > area(&groups[largest].box))) largest = i;
+        int largest = largest_of(groups, number, PL_FRONT_WIDTH + 1, SIZE_MAX);
+        if (largest < 0) largest = largest_of(groups, number, 2, (size_t)(PL_FRONT_WIDTH - number + 1));
         if (largest < 0) break;
         group g = groups[largest];
         size_t left = divide(&g, level);

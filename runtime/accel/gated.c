@@ -182,7 +182,9 @@ static bool visit_item(pl_tracer *tracer, const pending *at, const pl_item *item
         if (item->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[item->what];
         else leaf.shape = item->what;
         tracer->counters.primitive_tests++;
-        return pl_query_leaf(query, &leaf, o, d);
+        leaf.o = o;
+        leaf.d = d;
+        return pl_query_leaf(query, &leaf);
     }
     uint64_t hash = 0;
     if (scene->states.cuts) {

@@ -94,13 +94,13 @@ static bool offer_leaf(pl_tracer *tracer, const pl_grid_state *state, const pl_r
 {
     const pl_scene *scene = tracer->scene;
     const pl_node *node = &scene->program->nodes[state->node];
-    pl_leaf leaf = {.arguments = state->arguments, .path = leaf_path, .source = state};
     double o[3], d[3];
+    pl_leaf leaf = {.arguments = state->arguments, .path = leaf_path, .source = state, .o = o, .d = d};
     if (node->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[node->as.mesh.mesh];
     else leaf.shape = node->as.primitive.shape;
     map_ray(tracer->work, state, ray, o, d);
     tracer->counters.primitive_tests++;
-    return pl_query_leaf(query, &leaf, o, d);
+    return pl_query_leaf(query, &leaf);
 }
 
 /* Sets the graph to the state and goes on from there. */

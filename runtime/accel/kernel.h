@@ -124,47 +124,102 @@ static inline enum kernel_verdict filter(const pl_front_primitive *p, uint32_t k
     return deep.enter < deep.leave && deep.enter < t_max * 0.9999f ? CERTAIN : CANDIDATE;
 }
 
-/* What the loop keeps at hand of the frame it is in. */
-typedef struct near {
-    wide near_origin[3], far_origin[3], inverse[3];
-    int near_row[3], far_row[3];
-    float t_max;
-} near;
+/* --- entering an instance --- */
 
-/* t_max in the frame's own t, rounded up. */
-static inline float local_t_max(const pl_frame *f, double t_max)
+/* Four numbers at once: a vector and one that means nothing. */
+typedef double double4 __attribute__((vector_size(32), aligned(8), may_alias));
+typedef float float4 __attribute__((vector_size(16), aligned(4), may_alias));
+typedef int64_t long4 __attribute__((vector_size(32)));
+typedef int32_t int4 __attribute__((vector_size(16)));
+
+static inline double4 absolute(double4 x)
 {
-    if (f->rate == 0.0) return 1e30f;
-    double t = (t_max - f->t0) * f->rate * (1.0 + 0x1p-20);
-    return t < 1e30 ? (t > 0.0 ? (float)t + 1e-35f : 1e-35f) : 1e30f;
+    return (double4)((long4)x & INT64_MAX);
 }
 
-static inline void look(near *n, const pl_frame *f, double t_max)
+static inline float4 absolute_float(float4 x)
 {
-    for (int axis = 0; axis < 3; axis++) {
-        bool negative = f->direction[axis] < 0.0f;
-        float toward = negative ? -f->slack : f->slack;
-        n->near_origin[axis] = wide_set(f->origin[axis] + toward);
-        n->far_origin[axis] = wide_set(f->origin[axis] - toward);
-        n->inverse[axis] = wide_set(f->inverse[axis]);
-        n->near_row[axis] = negative ? 3 + axis : axis;
-        n->far_row[axis] = negative ? axis : 3 + axis;
-    }
-    n->t_max = local_t_max(f, t_max);
+    return (float4)((int4)x & INT32_MAX);
 }
 
-/* Which of a node's children the ray meets, one bit each, and where. */
-static inline unsigned meet(const near *n, const pl_front_node *node, float entry[PL_FRONT_WIDTH])
+static inline double larger(double a, double b)
 {
-    wide enter = wide_set(0.0f), leave = wide_set(n->t_max);
+    return a > b ? a : b;
+}
+
+/* The power of two that brings x into [1, 2), where it and its inverse are normal numbers. */
+static inline double inverse_power(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits = (UINT64_C(2046) << 52) - (bits & UINT64_C(2047) << 52);
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* A ray that can't be told in single precision meets everything. */
+static void give_up_filtering(pl_frame *f, double t_min)
+{
+    f->t0 = t_min;
+    f->rate = 0.0;
+    f->slack = 1e30f;
     for (int axis = 0; axis < 3; axis++) {
-        wide near_plane = wide_load(node->planes[n->near_row[axis]]);
-        wide far_plane = wide_load(node->planes[n->far_row[axis]]);
-        enter = wide_max(wide_multiply(wide_subtract(near_plane, n->near_origin[axis]), n->inverse[axis]), enter);
-        leave = wide_min(wide_multiply(wide_subtract(far_plane, n->far_origin[axis]), n->inverse[axis]), leave);
+        f->origin[axis] = f->direction[axis] = 0.0f;
+        f->inverse[axis] = 1.0f;
     }
-    wide_store(entry, enter);
-    return wide_at_most(enter, leave);
+}
+
+/* Begins a frame with the ray of f->o and f->d; false if it misses the box. f->t0 becomes where the box begins, roughly:
+ * no hit lies before it, and from there on all numbers are about 1, which single precision can tell apart.
+ *
+ * In the unit frame a hit lies outside its exact box by no more than `slack`: the rounding of the chain below (reach.h,
+ * twice: boxes here are composed too), of the ray above (error), of moving to t0; and of single precision, where
+ * 2^-19 is some 30 roundings. A direction that hardly moves along an axis still gets an inverse: within the front it moves
+ * by less than the slack either way. */
+static inline __attribute__((always_inline)) bool begin_frame(pl_frame *f, double4 o, double4 d, double t_min, double t_max)
+{
+    const pl_front *front = f->front;
+    double4 d_size = absolute(d), o_size = absolute(o);
+    double largest = larger(d_size[0], larger(d_size[1], d_size[2]));
+    double shrink = inverse_power(largest);
+    *(double4 *)f->o = o;
+    *(double4 *)f->d = d;
+    f->mapped = false;
+    f->distance = o_size[0] + o_size[1] + o_size[2];
+    double slack = f->error + DBL_EPSILON * (2.0 * (front->reach.gain * f->distance + front->reach.base) +
+                                             16.0 * (f->distance + front->reach.size));
+    slack *= 1.001 * front->scale;
+    f->rate = front->scale * inverse_power(shrink);
+    double4 origin = (o + t_min * d - *(const double4 *)front->centre) * front->scale, direction = d * shrink;
+    double4 far = absolute(origin);
+    double wide_slack = slack + 0x1p-19 * (1.0 + far[0] + far[1] + far[2]);
+    if (front->root == PL_NOTHING || !(f->rate > 1e-200 && f->rate < 1e200 && wide_slack < 1e6)) {
+        give_up_filtering(f, t_min);
+        return front->root != PL_NOTHING;
+    }
+    float4 along = __builtin_convertvector(direction, float4), at = __builtin_convertvector(origin, float4);
+    int4 still = absolute_float(along) <= 1e-18f;
+    along = (float4)((still & (int4)(float4){1e-18f, 1e-18f, 1e-18f, 1e-18f}) | (~still & (int4)along) |
+                     ((int4)along & INT32_MIN));
+    float4 inverse = 1.0f / along, middle = -at * inverse;
+    float4 reach = (*(const float4 *)front->half + (float)wide_slack) * absolute_float(inverse);
+    float4 near_t = middle - reach, far_t = middle + reach;
+    float enter = near_t[0] > near_t[1] ? near_t[0] : near_t[1], leave = far_t[0] < far_t[1] ? far_t[0] : far_t[1];
+    enter = near_t[2] > enter ? near_t[2] : enter;
+    leave = far_t[2] < leave ? far_t[2] : leave;
+    enter = enter > 0.0f ? enter : 0.0f;
+    f->t0 = t_min + (double)enter * shrink * front->size;
+    if (enter > leave || f->t0 > t_max) {
+        give_up_filtering(f, t_min);
+        return false;
+    }
+    origin += (double)enter * direction;
+    far = absolute(origin);
+    *(float4 *)f->origin = __builtin_convertvector(origin, float4);
+    *(float4 *)f->direction = along;
+    *(float4 *)f->inverse = inverse;
+    f->slack = (float)(slack + 0x1p-19 * (1.0 + far[0] + far[1] + far[2]));
+    return true;
 }
 
 /* Goes into an instance: frame `index` + 1. 0: it misses, 1: it meets the box, 2: only what is unbounded, -1: an error. */
@@ -179,24 +234,83 @@ static inline int descend(pl_tracer *tracer, uint32_t index, uint32_t instance, 
     if (query->shadow && it->item & PL_NO_SHADOW) return 0;
     pl_frame *f = &w->frames[index + 1];
     f->front = &fronts->list[it->front];
-    pl_affine_point(&it->to_object, parent->o, f->o);
-    pl_affine_vector(&it->to_object, parent->d, f->d);
-    double distance = __builtin_sqrt(parent->o[0] * parent->o[0] + parent->o[1] * parent->o[1] + parent->o[2] * parent->o[2]);
-    f->error = (double)it->stretch * parent->error +
-               DBL_EPSILON * ((double)it->gain * (2.0 * distance + front->reach.size) + (double)it->base);
     f->instance = instance;
-    f->depth = parent->depth + it->depth;
-    f->first = pl_add_saturating(parent->first, front->opened[it->opened].first);
-    const pl_item *item = &tracer->scene->states.list[front->opened[it->opened].state].items[it->item & ~PL_NO_SHADOW];
-    f->first = pl_add_saturating(f->first, item->first);
+    f->error = (double)it->stretch * parent->error +
+               DBL_EPSILON * ((double)it->gain * (2.0 * parent->distance + front->reach.size) + (double)it->base);
+    /* The fourth number of each is the next column's first, and nobody looks at what becomes of it. */
+    const double4 x = *(const double4 *)it->columns, y = *(const double4 *)(it->columns + 3);
+    const double4 z = *(const double4 *)(it->columns + 6), offset = *(const double4 *)(it->columns + 9);
+    double4 o = x * parent->o[0] + y * parent->o[1] + z * parent->o[2] + offset;
+    double4 d = x * parent->d[0] + y * parent->d[1] + z * parent->d[2];
     tracer->counters.instances++;
-    if (pl_frame_begin(f, query->t_min, query->t_max)) return 1;
+    if (begin_frame(f, o, d, query->t_min, query->t_max)) return 1;
     return f->front->unbounded_count ? 2 : 0;
 }
 
-/* Pushes what a frame begins with. */
+/* --- the loop --- */
+
+/* What the loop keeps at hand of the frame it is in. */
+typedef struct near {
+    wide near_origin[3], far_origin[3], inverse[3];
+    uint32_t near_row[3], far_row[3]; /* offsets of planes, in floats */
+    float t_max;
+} near;
+
+/* t_max in the frame's own t, rounded up. */
+static inline float local_t_max(const pl_frame *f, double t_max)
+{
+    if (f->rate == 0.0) return 1e30f;
+    double t = (t_max - f->t0) * f->rate * (1.0 + 0x1p-20);
+    return t < 1e30 ? (t > 0.0 ? (float)t + 1e-35f : 1e-35f) : 1e30f;
+}
+
+static inline void look(near *n, const pl_frame *f, double t_max)
+{
+#pragma GCC unroll 3
+    for (int axis = 0; axis < 3; axis++) {
+        bool negative = f->direction[axis] < 0.0f;
+        float toward = negative ? -f->slack : f->slack;
+        n->near_origin[axis] = wide_set(f->origin[axis] + toward);
+        n->far_origin[axis] = wide_set(f->origin[axis] - toward);
+        n->inverse[axis] = wide_set(f->inverse[axis]);
+        n->near_row[axis] = (uint32_t)(negative ? 3 + axis : axis) * PL_FRONT_WIDTH;
+        n->far_row[axis] = (uint32_t)(negative ? axis : 3 + axis) * PL_FRONT_WIDTH;
+    }
+    n->t_max = local_t_max(f, t_max);
+}
+
+/* Writes the children of a node that the ray meets, in no order; returns their number. */
+static inline unsigned meet(const near *n, const pl_front_node *node, uint64_t *entries)
+{
+    wide enter = wide_set(0.0f), leave = wide_set(n->t_max);
+    wide near_t[3], far_t[3];
+#pragma GCC unroll 3
+    for (int axis = 0; axis < 3; axis++) {
+        wide near_plane = wide_load(node->planes[0] + n->near_row[axis]);
+        wide far_plane = wide_load(node->planes[0] + n->far_row[axis]);
+        near_t[axis] = wide_multiply(wide_subtract(near_plane, n->near_origin[axis]), n->inverse[axis]);
+        far_t[axis] = wide_multiply(wide_subtract(far_plane, n->far_origin[axis]), n->inverse[axis]);
+    }
+    enter = wide_max(wide_max(near_t[0], near_t[1]), wide_max(near_t[2], enter));
+    leave = wide_min(wide_min(far_t[0], far_t[1]), wide_min(far_t[2], leave));
+    return wide_entries(enter, leave, node->child, entries);
+}
+
+/* The nearest last. */
+static inline void sort_entries(uint64_t *entries, unsigned count)
+{
+    for (unsigned i = 1; i < count; i++) {
+        uint64_t entry = entries[i];
+        unsigned place = i;
+        for (; place > 0 && entries[place - 1] < entry; place--) entries[place] = entries[place - 1];
+        entries[place] = entry;
+    }
+}
+
+/* Pushes what a frame begins with, below it the way back. */
 static inline bool begin(pl_bvh_work *w, const pl_front *front, bool met, size_t *top, pl_error *error)
 {
+    w->stack[(*top)++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
     for (uint32_t i = 0; i < front->unbounded_count; i++) {
         if (*top + 16 > w->stack_capacity && !pl_bvh_grow_stack(w, *top, error)) return false;
         w->stack[(*top)++] = entry_of(0.0f, front->unbounded[i]);
@@ -206,87 +320,75 @@ static inline bool begin(pl_bvh_work *w, const pl_front *front, bool met, size_t
     return true;
 }
 
-static inline bool visit(pl_tracer *tracer, pl_query *query, bool any)
+/* met: the root's box; else only what is unbounded there counts. */
+static inline bool visit(pl_tracer *tracer, pl_query *query, bool met, bool any)
 {
     pl_bvh_work *w = tracer->work;
-    uint64_t *stack = w->stack;
+    uint64_t *stack, steps = 0;
     uint32_t frame = 0;
     const pl_frame *f = &w->frames[0];
     size_t top = 0;
     near n;
-    uint64_t boxes = 0;
-    float entry[PL_FRONT_WIDTH];
-    bool met = pl_frame_begin(&w->frames[0], query->t_min, query->t_max);
-    w->frames[0].mapped = true;
     if (!begin(w, f->front, met, &top, query->error)) return false;
     stack = w->stack;
     look(&n, f, query->t_max);
-    for (uint64_t steps = 0; top > 0; steps++) {
-        if (steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
+    for (;;) {
         uint64_t at = stack[--top];
         pl_ref ref = (pl_ref)at;
         if (entry_t(at) > n.t_max) continue;
-    again:;
-        uint32_t kind = ref >> PL_REF_SHIFT;
-        if (kind == PL_KIND_NODE) {
+        while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
             const pl_front_node *node = &f->front->nodes[ref];
-            unsigned mask = meet(&n, node, entry);
-            boxes += PL_FRONT_WIDTH;
-            if (mask != 0xFF && f->depth > tracer->counters.miss_depth) tracer->counters.miss_depth = f->depth;
-            if (mask == 0) continue;
-            int i = __builtin_ctz(mask);
-            mask &= mask - 1;
-            if (mask == 0) {
-                ref = node->child[i];
-                goto again;
+            unsigned count = meet(&n, node, stack + top);
+            steps++;
+            if (count == 0) goto next;
+            if (count == 2) {
+                uint64_t a = stack[top], b = stack[top + 1];
+                stack[top] = a > b ? a : b;
+                stack[top + 1] = a > b ? b : a;
+            } else if (count > 2) {
+                sort_entries(stack + top, count);
             }
+            top += count - 1;
+            ref = (pl_ref)stack[top];
             if (top + 16 > w->stack_capacity) {
                 if (!pl_bvh_grow_stack(w, top, query->error)) return false;
                 stack = w->stack;
             }
-            size_t bottom = top;
-            stack[top++] = entry_of(entry[i], node->child[i]);
-            do {
-                i = __builtin_ctz(mask);
-                mask &= mask - 1;
-                uint64_t fresh = entry_of(entry[i], node->child[i]);
-                size_t place = top++;
-                for (; place > bottom && stack[place - 1] < fresh; place--) stack[place] = stack[place - 1];
-                stack[place] = fresh;
-            } while (mask);
-            ref = (pl_ref)stack[--top];
-            goto again;
         }
+        uint32_t kind = ref >> PL_REF_SHIFT;
         if (kind == PL_KIND_RETURN) {
+            if (frame == 0) break;
             f = &w->frames[--frame];
             look(&n, f, query->t_max);
-            continue;
-        }
-        if (kind == PL_KIND_INSTANCE) {
+        } else if (kind == PL_KIND_INSTANCE) {
             int entered = descend(tracer, frame, ref & PL_REF_INDEX, query);
             if (entered < 0) return false;
+            if (entered) frame++;
+            f = &w->frames[frame]; /* which may have moved */
             if (!entered) continue;
-            f = &w->frames[++frame];
-            stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
             if (!begin(w, f->front, entered == 1, &top, query->error)) return false;
             stack = w->stack;
             look(&n, f, query->t_max);
-            continue;
+            if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
+        } else {
+            const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
+            if (query->shadow && p->item & PL_NO_SHADOW) continue;
+            tracer->counters.filtered++;
+            enum kernel_verdict verdict = filter(p, kind, f, n.t_max, any);
+            if (verdict == MISS) continue;
+            if (any && verdict == CERTAIN) {
+                query->found = query->done = true;
+                break;
+            }
+            wide_end();
+            if (!pl_bvh_candidate(tracer, frame, ref, query)) return false;
+            if (query->done) break;
+            n.t_max = local_t_max(f, query->t_max);
+            if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
         }
-        const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
-        if (query->shadow && p->item & PL_NO_SHADOW) continue;
-        tracer->counters.filtered++;
-        enum kernel_verdict verdict = filter(p, kind, f, n.t_max, any);
-        if (verdict == MISS) continue;
-        if (any && verdict == CERTAIN) {
-            query->found = query->done = true;
-            break;
-        }
-        if (!pl_bvh_candidate(tracer, frame, ref, query)) return false;
-        if (query->done) break;
-        n.t_max = local_t_max(f, query->t_max);
+    next:;
     }
-    tracer->counters.box_tests += boxes;
+    tracer->counters.box_tests += steps * PL_FRONT_WIDTH;
     return true;
 }
 
@@ -295,13 +397,20 @@ bool KERNEL(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     pl_bvh_work *w = tracer->work;
     const pl_fronts *fronts = tracer->scene->structure;
     pl_frame *root = &w->frames[0];
+    const double4 o = {ray->origin[0], ray->origin[1], ray->origin[2]};
+    const double4 d = {ray->direction[0], ray->direction[1], ray->direction[2]};
     root->front = &fronts->list[0];
-    memcpy(root->o, ray->origin, sizeof root->o);
-    memcpy(root->d, ray->direction, sizeof root->d);
-    memcpy(root->normative_o, ray->origin, sizeof root->o);
-    memcpy(root->normative_d, ray->direction, sizeof root->d);
     root->error = 0.0;
-    root->first = 0;
-    root->depth = root->instance = 0;
-    return query->kind == PL_QUERY_ANY ? visit(tracer, query, true) : visit(tracer, query, false);
+    root->instance = 0;
+    bool met = begin_frame(root, o, d, query->t_min, query->t_max);
+    if (!met && !root->front->unbounded_count) {
+        wide_end();
+        return true;
+    }
+    root->mapped = true;
+    memcpy(root->normative_o, ray->origin, sizeof root->normative_o);
+    memcpy(root->normative_d, ray->direction, sizeof root->normative_d);
+    bool ok = query->kind == PL_QUERY_ANY ? visit(tracer, query, met, true) : visit(tracer, query, met, false);
+    wide_end();
+    return ok;
 }

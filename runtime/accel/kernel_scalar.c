@@ -1,5 +1,14 @@
 /* kernel_scalar.c - the traversal (kernel.h) in plain C, for any machine. */
+#include <string.h>
+
+#include "bvh.h"
+
+/* Vectors of four doubles are lowered to what there is; they don't leave this file. */
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 #define KERNEL pl_bvh_trace_scalar
+
+#define wide_end() ((void)0)
 
 typedef struct wide {
     float at[8];
@@ -44,16 +53,17 @@ static inline wide wide_min(wide a, wide b)
     return a;
 }
 
-static inline unsigned wide_at_most(wide a, wide b)
+/* Entries of the children whose enter <= leave; their number. */
+static inline unsigned wide_entries(wide enter, wide leave, const pl_ref *child, uint64_t *entries)
 {
-    unsigned mask = 0;
-    for (int i = 0; i < 8; i++) mask |= (unsigned)(a.at[i] <= b.at[i]) << i;
-    return mask;
-}
-
-static inline void wide_store(float *to, wide a)
-{
-    for (int i = 0; i < 8; i++) to[i] = a.at[i];
+    unsigned count = 0;
+    for (int i = 0; i < 8; i++) {
+        uint32_t bits;
+        memcpy(&bits, &enter.at[i], sizeof bits);
+        entries[count] = (uint64_t)bits << 32 | child[i];
+        count += enter.at[i] <= leave.at[i];
+    }
+    return count;
 }
 
 #include "kernel.h"

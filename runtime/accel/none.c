@@ -49,7 +49,7 @@ bool pl_walk_offer(pl_walk *walk, const pl_scene *scene, pl_counters *counters, 
     double *o = walk->at.payload, *d = o + 3;
     walk->stretches = cuts;
     while (!query->done) {
-        pl_leaf leaf = {.path = walk_path, .source = walk};
+        pl_leaf leaf = {.path = walk_path, .source = walk, .o = o, .d = d};
         if (++steps > PL_LIMIT_WALK_STEPS) return pl_query_fail_steps(query, PL_LIMIT_WALK_STEPS);
         switch (pl_walk_next(walk, query->error)) {
         case PL_EVENT_ERROR: return false;
@@ -74,7 +74,7 @@ bool pl_walk_offer(pl_walk *walk, const pl_scene *scene, pl_counters *counters, 
         leaf.primitive = primitive++;
         if (query->shadow && walk->at.no_shadow) continue;
         counters->primitive_tests++;
-        if (!pl_query_leaf(query, &leaf, o, d)) return false;
+        if (!pl_query_leaf(query, &leaf)) return false;
     }
     return true;
 }

@@ -49,6 +49,7 @@ static void set_hit(pl_hit *hit, const pl_leaf *leaf, const pl_root *root)
     hit->t = root->t;
     hit->primitive = leaf->primitive;
     hit->part = root->part;
+    for (int axis = 0; axis < 3; axis++) hit->local[axis] = leaf->o[axis] + root->t * leaf->d[axis];
     hit->cut_depth = leaf->cut_depth;
     hit->bound = leaf->cut_depth ? leaf->bound : NAN;
 }
@@ -111,8 +112,9 @@ static bool keep_mesh_root(void *context, pl_root root)
     return v->ok;
 }
 
-bool pl_query_leaf(pl_query *query, const pl_leaf *leaf, const double o[3], const double d[3])
+bool pl_query_leaf(pl_query *query, const pl_leaf *leaf)
 {
+    const double *o = leaf->o, *d = leaf->d;
     pl_root roots[PL_SHAPE_ROOTS];
     if (leaf->mesh && query->kind == PL_QUERY_ALL) {
         mesh_visit v = {query, leaf, true};
@@ -135,6 +137,8 @@ bool pl_query_cut(pl_query *query, const pl_states *states, const pl_arrival *at
     if (!(t_entry < query->t_max) || !pl_cut_is_drawn(states, at->state, at->d, hash, at->depth, query->ray))
         return true;
     pl_leaf cut = *leaf;
+    cut.o = at->o;
+    cut.d = at->d;
     cut.cut_depth = at->depth;
     cut.bound = states->list[at->state].diameter * at->stretch / query->length;
     return keep(query, &cut, &(pl_root){t_entry, 0});

@@ -73,6 +73,7 @@ typedef struct answers {
 } answers;
 
 typedef struct first_hit {
+    pl_tracer *tracer;
     double t, previous;
     uint64_t primitive;
     int count;
@@ -82,7 +83,7 @@ static bool keep_first(void *context, const pl_hit *hit)
 {
     first_hit *first = context;
     CHECK(hit->t >= first->previous);
-    if (first->count++ == 0) first->t = hit->t, first->primitive = hit->primitive;
+    if (first->count++ == 0) first->t = hit->t, first->primitive = pl_trace_primitive(first->tracer, hit);
     first->previous = hit->t;
     return true;
 }
@@ -97,7 +98,7 @@ static void check_tracer(pl_scene *scene, const answers *expected)
         pl_ray ray = {.t_min = 0.0, .t_max = INFINITY};
         memcpy(ray.origin, origins + 3 * i, sizeof ray.origin);
         memcpy(ray.direction, directions + 3 * i, sizeof ray.direction);
-        first_hit first = {INFINITY, -INFINITY, 0, 0};
+        first_hit first = {tracer, INFINITY, -INFINITY, 0, 0};
         CHECK(pl_trace_all(tracer, &ray, keep_first, &first, &error));
         CHECK(first.t == expected->t[i]);
         CHECK(first.count == 0 || (int64_t)first.primitive == expected->primitive[i]);
