@@ -26,6 +26,9 @@ logger = logging.getLogger(__name__)
 _LENGTH = re.compile(rb"content-length:\s*(\d+)\s*$", re.IGNORECASE)
 MAX_MESSAGE_BYTES = 1 << 30
 
+# What lives long is searched for garbage once in a hundred million new objects: that takes a tenth of a second.
+GARBAGE_THRESHOLDS = 10_000, 10, 1_000
+
 # Whole-file checks begin when nothing was typed for so long: their snapshot costs some milliseconds.
 PAUSE_S = 0.1
 
@@ -148,6 +151,7 @@ async def _serve(stream: BinaryIO, output: BinaryIO) -> int:
             pass  # the loop is closed already
 
     gc.freeze()
+    gc.set_threshold(*GARBAGE_THRESHOLDS)
     threading.Thread(target=read, daemon=True, name="stdin").start()
     await ended.wait()
     while dispatcher.session.exit_code is None and dispatcher.is_busy:
