@@ -147,7 +147,9 @@ static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
     if (item->kind == PL_NODE_MESH) leaf.mesh = tracer->scene->meshes[item->what];
     else leaf.shape = item->what;
     tracer->counters.primitive_tests++;
-    return pl_query_leaf(query, &leaf, f.o, f.d);
+    leaf.o = f.o;
+    leaf.d = f.d;
+    return pl_query_leaf(query, &leaf);
 }
 
 static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
