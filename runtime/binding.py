@@ -108,6 +108,11 @@ class PlStatistics(ctypes.Structure):
         ("cut_instances", c_uint64),
         ("cut_max_error", c_double),
         *((f"lazy_{name}", c_uint64) for name in ("unfolded", "evicted", "states", "bytes", "classes")),
+        *((name, c_uint64) for name in ("instances", "filtered")),
+        *((f"front_{name}", c_uint64) for name in ("count", "items", "instances", "limit")),
+        *((f"bytes_{name}", c_uint64) for name in ("program", "meshes", "states", "nodes", "items")),
+        ("seconds_states", c_double),
+        ("isa", c_int),
     ]
 
 

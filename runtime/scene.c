@@ -6,7 +6,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "accel/accel.h"
+#include "accel/front.h"
 #include "accel/lazy.h"
 #include "cut.h"
 #include "error.h"
@@ -193,7 +193,9 @@ static bool build(pl_scene *scene, pl_error *error)
     double start = pl_seconds();
     const size_t limit = scene->memory = scene->options.memory ? scene->options.memory : default_memory();
     if (!build_meshes(scene, error) || !find_rule_places(scene, error)) return false;
+    double before_states = pl_seconds();
     if (!build_states(scene, limit, error)) return false;
+    scene->statistics.seconds_states = pl_seconds() - before_states;
     if (scene->accel->build && !scene->accel->build(scene, error)) return false;
     scene->all_opaque = is_opaque(scene->program);
 
@@ -206,7 +208,12 @@ static bool build(pl_scene *scene, pl_error *error)
         counts->depth = root->endless ? UINT64_MAX : root->depth;
         counts->states = scene->states.count - 1; /* the scene itself is none */
     }
-    counts->scene_bytes = sizeof *scene + scene->program->bytes + scene->mesh_bytes + scene->states.bytes;
+    counts->bytes_program = sizeof *scene + scene->program->bytes;
+    counts->bytes_meshes = scene->mesh_bytes;
+    counts->bytes_states = scene->states.bytes;
+    if (scene->accel == &pl_accel_bvh) pl_fronts_count(scene, counts);
+    counts->scene_bytes = counts->bytes_program + counts->bytes_meshes + counts->bytes_states + counts->bytes_nodes +
+                          counts->bytes_items;
     counts->detail = scene->detail;
     counts->accelerator = scene->accel == &pl_accel_boxes ? PL_BOXES : accelerator_ids[scene->options.accelerator];
     counts->threads = scene->threads;
@@ -335,6 +342,8 @@ void pl_scene_count(pl_scene *scene, const pl_tracer *tracer, const pl_ray_count
     pl_statistics *counts = &scene->statistics;
     counts->box_tests += tracer->counters.box_tests;
     counts->primitive_tests += tracer->counters.primitive_tests;
+    counts->instances += tracer->counters.instances;
+    counts->filtered += tracer->counters.filtered;
     counts->rays_primary += rays->primary;
     counts->rays_shadow += rays->shadow;
     counts->rays_reflection += rays->reflection;

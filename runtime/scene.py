@@ -290,19 +290,24 @@ class Scene:
         transmitted}, seconds {verify, build, trace}, accelerator, threads, detail (the cut-off in pixels, 0: none), cut {instances: rays
         that ended at a cut instance's box, max_error: the largest error bound of their distance, in scene units}, lazy {unfolded, evicted: states, where there are too
         many to build; states, bytes, classes: of these in memory now}.
+
+        Of bvh: isa (None: another accelerator), front {count, items, instances: items that are one, limit: items that one
+        may have, None: any number}, instances (entered), filtered (primitives tried in single precision). bytes {program,
+        meshes, states, nodes, items} is scene_bytes by structure; seconds["states"] is a part of seconds["build"].
         """
         counts = PlStatistics()
         with self._open() as handle:
             library().pl_scene_statistics(handle, ctypes.byref(counts))
-        result: dict = {"rays": {}, "seconds": {}, "cut": {}, "lazy": {}}
+        result: dict = {"rays": {}, "seconds": {}, "cut": {}, "lazy": {}, "front": {}, "bytes": {}}
         for name, _ in PlStatistics._fields_:
             group, _, member = name.partition("_")
             place = result[group] if group in result else result
             place[member if group in result else name] = getattr(counts, name)
         result["accelerator"] = ACCELERATORS[counts.accelerator]
-        for name in ("primitives", "depth"):
-            if result[name] == UNKNOWN:
-                result[name] = None
+        result["isa"] = INSTRUCTION_SETS[counts.isa] if counts.isa else None
+        for group, name in ((result, "primitives"), (result, "depth"), (result["front"], "limit")):
+            if group[name] == UNKNOWN:
+                group[name] = None
         return result
 
     def symbol_name(self, symbol: int) -> str:

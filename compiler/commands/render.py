@@ -38,6 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", type=size, default=(640, 480), metavar="WxH", help="in pixels (default 640x480)")
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="default: one a core")
     parser.add_argument("--accel", choices=ACCELERATORS, default="auto", help="accelerator")
+    parser.add_argument(
+        "--memory", type=memory, metavar="SIZE", help="of states and structures: 64K, 1M, 2G (default: by the caches)"
+    )
     parser.add_argument("--grid", type=voxels, metavar="NxMxK", help="voxels of --accel grid (default 16x16x8)")
     parser.add_argument("--antialias", type=antialias, default=("off", 0, 0.0), metavar="A", help=ANTIALIAS)
     parser.add_argument("--aov", type=aov_names, default=(), metavar="A,B", help=f"extra channels: {', '.join(AOVS)}")
@@ -48,7 +51,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--detail", type=pixels, metavar="PX", help="draw what is smaller than PX pixels as a box (0: nothing; default: 0, but 0.5 where a recursion has no end)"
     )
-    parser.add_argument("--explain", action="store_true", help="say what was left out because the scene doesn't need it")
+    parser.add_argument("--explain", action="store_true", help="say what was built, and what was left out and why")
+
+
+def memory(text: str) -> int:
+    """``64K`` → 65536; K, M and G are powers of 1024."""
+    exponent = "KMG".find(text[-1:].upper()) + 1 if text else 0
+    try:
+        size = int(float(text[:-1] if exponent else text) * 1024**exponent)
+    except (ValueError, OverflowError):
+        size = 0
+    if not 1 <= size < 2**63:
+        raise argparse.ArgumentTypeError(f"'{text}' isn't a size in bytes, such as 64K, 1M or 2G")
+    return size
 
 
 def antialias(text: str) -> tuple[str, int, float]:
@@ -117,6 +132,7 @@ def run(arguments: argparse.Namespace) -> int:
         accelerator=arguments.accel,
         threads=arguments.threads or None,
         povray_epsilon=arguments.povray_epsilon,
+        memory=arguments.memory,
         grid=arguments.grid,
         detail=arguments.detail,
     ) as scene:
@@ -124,12 +140,14 @@ def run(arguments: argparse.Namespace) -> int:
         statistics = scene.statistics
         before_write = time.perf_counter()
         _write(arguments, image, statistics)
-    seconds |= {name: statistics["seconds"][name] for name in ("verify", "build", "trace")}
+    seconds |= {name: statistics["seconds"][name] for name in ("verify", "states", "build", "trace")}
     seconds["write"] = time.perf_counter() - before_write
     facts = _facts(arguments, statistics, seconds, left_out)
     if arguments.json:
         print_json(facts)
     elif arguments.explain:
+        for row in _built(statistics):
+            print("built: {:<12} {:>14,} bytes  {}".format(*row))
         for row in facts["left_out"]:
             print(f"left out: {row['what']}: {row['why']}")
     return 0
@@ -221,6 +239,24 @@ def _picture1(image: dict):
     return np.where(missed, brightness[..., None] * tint, image["color"]).astype(np.float32)
 
 
+def _built(statistics: dict) -> list[tuple[str, int, str]]:
+    """(structure, bytes, what it holds) of what the scene needed."""
+    front, size, seconds = statistics["front"], statistics["bytes"], statistics["seconds"]
+    rows = [("program", size["program"], f"verified in {seconds['verify']:.4f} s")]
+    if size["meshes"]:
+        rows.append(("meshes", size["meshes"], "boxes over triangles"))
+    if size["states"]:
+        rows.append(("states", size["states"], f"{statistics['states']} in {seconds['states']:.4f} s"))
+    if front["count"]:
+        limit = "any number" if front["limit"] is None else f"at most {front['limit']:,}"
+        build = seconds["build"] - seconds["states"]
+        rows.append(("front items", size["items"], f"{front['items']:,}, {front['instances']:,} of them instances"))
+        rows.append(
+            ("front nodes", size["nodes"], f"of {front['count']:,} fronts with {limit} items each, in {build:.4f} s; {statistics['isa']}")
+        )
+    return rows
+
+
 def _facts(arguments: argparse.Namespace, statistics: dict, seconds: dict, left_out: list) -> dict:
     width, height = arguments.size
     return {
@@ -235,9 +271,18 @@ def _facts(arguments: argparse.Namespace, statistics: dict, seconds: dict, left_
         "cut": statistics["cut"],
         "lazy": statistics["lazy"],
         "rays": statistics["rays"],
+        "isa": statistics["isa"],
+        "front": statistics["front"],
+        "tests": {
+            "nodes": statistics["box_tests"] // 8 if statistics["isa"] else statistics["box_tests"],
+            "instances": statistics["instances"],
+            "primitives_filtered": statistics["filtered"],
+            "primitives": statistics["primitive_tests"],
+        },
         "seconds": {name: round(value, 6) for name, value in seconds.items()},
         "memory": {
             "scene_bytes": statistics["scene_bytes"],
+            **{f"{name}_bytes": value for name, value in statistics["bytes"].items()},
             "peak_rss_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
         },
         "left_out": [{"what": row.what, "why": row.why} for row in left_out],

@@ -232,3 +232,15 @@ void pl_fronts_destroy(pl_scene *scene)
     free(fronts->of_state);
     free(fronts);
 }
+
+void pl_fronts_count(const pl_scene *scene, pl_statistics *counts)
+{
+    const pl_fronts *fronts = scene->structure;
+    counts->front_count = fronts->count;
+    counts->front_items = fronts->items;
+    counts->front_instances = fronts->instances;
+    counts->front_limit = fronts->flat ? UINT64_MAX : fronts->limit_items;
+    counts->bytes_nodes = fronts->node_bytes;
+    counts->bytes_items = fronts->bytes - fronts->node_bytes;
+    counts->isa = scene->isa;
+}

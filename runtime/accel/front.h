@@ -153,4 +153,7 @@ uint32_t pl_front_tree(pl_boxed *boxes, size_t count, pl_front_node *nodes, pl_r
 bool pl_fronts_build(pl_scene *scene, pl_error *error);
 void pl_fronts_destroy(pl_scene *scene);
 
+/* What was built, for the statistics. */
+void pl_fronts_count(const pl_scene *scene, pl_statistics *counts);
+
 #endif

@@ -131,6 +131,11 @@ typedef struct pl_statistics {
     double cut_max_error;   /* the largest error bound of these, in scene units */
     /* Where there are too many states to build: unfolded when rays came to them, thrown out again, and in memory now. */
     uint64_t lazy_unfolded, lazy_evicted, lazy_states, lazy_bytes, lazy_classes;
+    uint64_t instances, filtered; /* of bvh: instances entered, primitives tried in single precision before primitive_tests */
+    uint64_t front_count, front_items, front_instances, front_limit; /* of bvh; limit: K, UINT64_MAX: any number */
+    uint64_t bytes_program, bytes_meshes, bytes_states, bytes_nodes, bytes_items; /* scene_bytes by structure */
+    double seconds_states; /* of seconds_build */
+    int isa;               /* pl_isa of bvh's kernel; 0: another accelerator */
 } pl_statistics;
 
 PL_API void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics);

@@ -147,7 +147,7 @@ def test_statistics_count_rays_and_costs(tree):
     assert statistics["rays"]["primary"] == 32 * 24 and statistics["primitives"] == 65
     assert statistics["accelerator"] == "bvh" and statistics["threads"] == 2
     assert statistics["box_tests"] > 0 and statistics["seconds"]["trace"] > 0
-    assert set(statistics["seconds"]) == {"verify", "build", "trace"}
+    assert set(statistics["seconds"]) == {"verify", "states", "build", "trace"}
 
 
 @pytest.mark.parametrize("data", [b"", b"PLSB", b"x" * 100])
