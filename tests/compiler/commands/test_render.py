@@ -91,7 +91,7 @@ def test_extra_channels(tmp_path):
 
 def test_picture_1_colours_the_background_by_recursion_depth(tmp_path):
     path = tmp_path / "t.png"
-    assert main(["render", TREE, "-o", str(path), "--accel", "boxes", "--aov", "picture1", "--size", "96x72"]) == 0
+    assert main(["render", TREE, "-o", str(path), "--aov", "picture1", "--size", "96x72"]) == 0
     shown = pixels(tmp_path / "t.picture1.png")
     red, blue = (shown[..., 0] > shown[..., 2]), (shown[..., 2] > shown[..., 0])
     assert red.sum() > 10 and blue.sum() > 10
