@@ -64,7 +64,7 @@ static bool describe(pl_tracer *tracer, const pl_hits *out, size_t i, const pl_r
 
 static bool trace_one(job *j, pl_tracer *tracer, size_t i, pl_hit *hit, pl_error *error)
 {
-    pl_ray ray;
+    pl_ray ray = {0};
     if (!set_ray(j, i, &ray, error)) return false;
     if (j->hits) return pl_trace_nearest(tracer, &ray, hit, error) && describe(tracer, j->hits, i, &ray, hit, error);
     int found = pl_trace_any(tracer, &ray, error);

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import whole
 
 from plsys.compiler.pipeline import build
 from plsys.compiler.reading.source import Source
@@ -177,6 +178,13 @@ def test_no_detail_ends_where_rounding_does():
         np.testing.assert_array_equal(ours, theirs, err_msg=name)
     hit = np.isfinite(results[0].t)
     assert hit.any() and results[0].bound[hit].max() < 1e-9
+
+
+def test_what_was_on_the_stack_before_changes_no_hit(tmp_path):
+    path = tmp_path / "sponge.plsb"
+    path.write_bytes(compiled(view((0.5, -3, 0.5), (0.5, 0, 0.5)) + SPONGE + f"object {{ Sponge {WHITE} }}"))
+    done = whole.run(whole.program("accel/stale.c", "plain"), path)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_the_texture_is_that_of_the_first_primitive():
