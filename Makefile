@@ -12,7 +12,7 @@ SOURCES := pyproject.toml CMakeLists.txt README.md LICENSE grammar/src/parser.c 
 RUNTIME_C := $(wildcard runtime/*.c runtime/shapes/*.c runtime/accel/*.c)
 CFLAGS_DEV := -std=gnu11 -O2 -g -Wall -Wextra -Werror -ffp-contract=off -fno-math-errno -fPIC -fvisibility=hidden -Iruntime -Iruntime/include
 
-.PHONY: render test stress help dev generate bench bench-lsp check-generated bless sanitize wheel clean
+.PHONY: render test stress help dev generate bench bench-lsp check-generated bless wheel clean
 
 render: .venv/.installed ## draw SCENE to OUT
 	$(BIN)/plsys render $(SCENE) -o $(OUT)
