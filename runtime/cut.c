@@ -6,19 +6,54 @@
 /* An endless state is cut where its box is smaller than so many times what rounding can move a ray by. */
 #define BLUR 16.0
 
-pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], const double d[3], double stretch,
-                   const pl_footprint *footprint, double t_min, double t_max, double *t_entry)
+/* How much wider boxes are where they end what stands below: for its own slack, and for roundings of composed maps. */
+#define ROOM_SLACK 4.0
+#define ROOM_SIZE 0x1p-30
+
+static pl_span clip(const pl_box *box, const double o[3], const double d[3], double slack, pl_span within)
+{
+    pl_slab slab = pl_slab_of(o, d, slack);
+    for (int axis = 0; axis < 3; axis++) {
+        double near_plane = slab.negative[axis] ? box->hi[axis] : box->lo[axis];
+        double far_plane = slab.negative[axis] ? box->lo[axis] : box->hi[axis];
+        double t_near = (near_plane - slab.near_origin[axis]) * slab.inverse[axis];
+        double t_far = (far_plane - slab.far_origin[axis]) * slab.inverse[axis];
+        within.enter = t_near > within.enter ? t_near : within.enter;
+        within.leave = t_far < within.leave ? t_far : within.leave;
+    }
+    return within;
+}
+
+static pl_span span_with_room(const pl_state *s, const double o[3], const double d[3], double slack, pl_span within)
+{
+    return clip(&s->box, o, d, ROOM_SLACK * slack + ROOM_SIZE * s->diameter, within);
+}
+
+pl_span pl_span_in(const pl_states *states, uint32_t state, const double o[3], const double d[3], pl_span within)
 {
     const pl_state *s = &states->list[state];
+    return s->unbounded ? within : span_with_room(s, o, d, pl_reach_slack(&s->gate, o), within);
+}
+
+pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], const double d[3], double stretch,
+                   const pl_footprint *footprint, pl_span within, double t_min, double t_max, double *t_entry,
+                   pl_span *inside)
+{
+    const pl_state *s = &states->list[state];
+    *inside = within;
     if (s->unbounded) return PL_GATE_OPEN;
     if (pl_box_is_empty(&s->box)) return PL_GATE_MISSED;
     double slack = pl_reach_slack(&s->gate, o);
-    pl_slab slab = pl_slab_of(o, d, slack);
-    if (!pl_slab_hits(&slab, &s->box, t_min, t_max, t_entry)) return PL_GATE_MISSED;
-    bool small = s->diameter * stretch <= footprint->width + footprint->spread * *t_entry;
-    if (!small && !(s->endless && s->diameter <= BLUR * slack)) return PL_GATE_OPEN;
+    pl_span own = clip(&s->box, o, d, slack, within);
+    *t_entry = own.enter;
+    if (!(own.enter <= own.leave && own.enter <= t_max)) return PL_GATE_MISSED;
+    bool small = s->diameter * stretch <= footprint->width + footprint->spread * own.enter;
+    if (!small && !(s->endless && s->diameter <= BLUR * slack)) {
+        *inside = span_with_room(s, o, d, slack, within);
+        return PL_GATE_OPEN;
+    }
     /* From within, and within the footprint that a ray starts from, nothing is told of the box's sides. */
-    return *t_entry > t_min && *t_entry > footprint->skip ? PL_GATE_CUT : PL_GATE_MISSED;
+    return own.enter > t_min && own.enter > footprint->skip ? PL_GATE_CUT : PL_GATE_MISSED;
 }
 
 uint64_t pl_cut_hash(uint64_t hash, const uint32_t *terms, uint32_t count)

@@ -3,16 +3,19 @@
  * In a scene with a cut-off (states->cuts) every instance of a state is passed through its *gate*, and the gates are part of
  * the normative hit: an accelerator that comes to an instance, with the ray mapped there step by step, asks
  *
- *     switch (pl_gate_of(states, state, o, d, stretch, &query->footprint, query->t_min, query->t_max, &t_entry)) {
+ *     switch (pl_query_gate(query, states, &arrival, &t_entry, &inside)) {
  *     case PL_GATE_MISSED: leave the instance out
- *     case PL_GATE_OPEN:   go on with its items
+ *     case PL_GATE_OPEN:   go on with its items, instances among them within the span `inside`
  *     case PL_GATE_CUT:    pl_query_cut(…), which draws it or leaves it out
  *     }
  *
  * and otherwise may filter as it likes as long as it doesn't leave out an instance that would pass all gates on its path.
  * So a hit with cut-offs depends on the path alone, and boxes of items must hold the whole boxes of their states
- * (pl_item_box). What is open at a gate is decided in double from the mapped ray, the state's own box and the product
- * of the stretches of the transformations on the path, outermost first, starting from 1.
+ * (pl_item_box). What is open at a gate is decided in double from the mapped ray, the state's own box, the span of t in
+ * which the ray is within the boxes of all instances above, and the product of the stretches of the transformations on
+ * the path, outermost first, starting from 1. Boxes of states need not lie within those of the states that enter them; the
+ * span cuts off what doesn't, so that boxes may be left out with all that stands in them. It leaves a little room, so
+ * that it changes nothing where a box does lie within.
  *
  * An instance is cut when diameter · stretch <= PX · footprint(t at the box's entry): then no point of it is farther than
  * that from the box's entry. The footprint is a pixel's width at that distance. In endless states an instance
@@ -36,11 +39,21 @@ typedef struct pl_footprint {
     double width, spread, skip;
 } pl_footprint;
 
+/* Of t, in which a ray is within the boxes of the instances passed so far. */
+typedef struct pl_span {
+    double enter, leave;
+} pl_span;
+
 typedef enum pl_gate { PL_GATE_MISSED, PL_GATE_OPEN, PL_GATE_CUT } pl_gate;
 
-/* stretch: the product of the stretches on the path. t_max only saves work. */
+/* stretch: the product of the stretches on the path. within: the span above, at first from the ray's t_min to INFINITY.
+ * t_max only saves work. Where the gate is open, *inside is the span for what stands below. */
 pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], const double d[3], double stretch,
-                   const pl_footprint *footprint, double t_min, double t_max, double *t_entry);
+                   const pl_footprint *footprint, pl_span within, double t_min, double t_max, double *t_entry,
+                   pl_span *inside);
+
+/* The span below an instance, whatever its gate: that of the instance's box with room, within the one above. */
+pl_span pl_span_in(const pl_states *states, uint32_t state, const double o[3], const double d[3], pl_span within);
 
 /* The path's hash so far and more terms of it; 0 at the root. */
 uint64_t pl_cut_hash(uint64_t hash, const uint32_t *terms, uint32_t count);

@@ -65,16 +65,17 @@ typedef struct pl_arrival {
     uint32_t state;
     const double *o, *d;
     double stretch;
+    pl_span within; /* of the instances above */
     uint32_t depth; /* symbols entered, the state's own included */
 } pl_arrival;
 
 /* Whether the instance is to be gone into. Where it is cut, the box is offered at t_entry by pl_query_cut; the path's hash
  * (pl_cut_hash of all its terms) is wanted only then. */
 static inline pl_gate pl_query_gate(const pl_query *query, const pl_states *states, const pl_arrival *at,
-                                    double *t_entry)
+                                    double *t_entry, pl_span *inside)
 {
-    return pl_gate_of(states, at->state, at->o, at->d, at->stretch, &query->footprint, query->t_min, query->t_max,
-                      t_entry);
+    return pl_gate_of(states, at->state, at->o, at->d, at->stretch, &query->footprint, at->within, query->t_min,
+                      query->t_max, t_entry, inside);
 }
 
 /* Offers a cut instance's box; leaf: path, source and primitive. false: an error. */

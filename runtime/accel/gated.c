@@ -20,6 +20,7 @@ typedef struct frame {
     double o[3], d[3];
     double stretch; /* with cut-offs: the product of stretches, and the hash of the path (cut.h) */
     uint64_t hash;
+    pl_span inside;
     pl_slab slab;
 } frame;
 
@@ -187,10 +188,11 @@ static bool visit_item(pl_tracer *tracer, const pending *at, const pl_item *item
         return pl_query_leaf(query, &leaf);
     }
     uint64_t hash = 0;
+    pl_span inside = parent->inside;
     if (scene->states.cuts) {
-        pl_arrival arrival = {item->what, o, d, stretch, depth};
+        pl_arrival arrival = {item->what, o, d, stretch, parent->inside, depth};
         double t_entry;
-        pl_gate gate = pl_query_gate(query, &scene->states, &arrival, &t_entry);
+        pl_gate gate = pl_query_gate(query, &scene->states, &arrival, &t_entry, &inside);
         if (gate == PL_GATE_MISSED) return true;
         hash = pl_cut_hash(parent->hash, item->terms, item->term_count);
         if (gate == PL_GATE_CUT) {
@@ -208,6 +210,7 @@ static bool visit_item(pl_tracer *tracer, const pending *at, const pl_item *item
     f->first = first;
     f->stretch = stretch;
     f->hash = hash;
+    f->inside = inside;
     memcpy(f->o, o, sizeof o);
     memcpy(f->d, d, sizeof d);
     return begin_frame(scene, w, index, item->what, at->t_entry, query);
@@ -221,6 +224,7 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     if (!root) return false;
     memset(root, 0, sizeof *root);
     root->stretch = 1.0;
+    root->inside = (pl_span){query->t_min, INFINITY};
     memcpy(root->o, ray->origin, sizeof root->o);
     memcpy(root->d, ray->direction, sizeof root->d);
     if (!begin_frame(tracer->scene, w, 0, 0, query->t_min, query)) return false;

@@ -12,8 +12,8 @@ static bool walk_path(const void *source, pl_path *path)
     return pl_path_copy(path, &walk->path, walk->at.terms);
 }
 
-/* Where the payload has the product of stretches, behind the ray. */
-enum { STRETCH = 6 };
+/* What the payload has behind the ray, where there are cut-offs: the product of stretches, and the span (cut.h). */
+enum { STRETCH = 6, ENTER, LEAVE };
 
 /* At an enter node: goes on only into instances whose gate is open. */
 static bool pass_gate(pl_walk *walk, const pl_scene *scene, pl_counters *counters, pl_query *query)
@@ -24,15 +24,21 @@ static bool pass_gate(pl_walk *walk, const pl_scene *scene, pl_counters *counter
                      .o = walk->at.payload,
                      .d = walk->at.payload + 3,
                      .stretch = walk->at.payload[STRETCH],
+                     .within = {walk->at.payload[ENTER], walk->at.payload[LEAVE]},
                      .depth = walk->at.depth + 1};
     double t_entry;
+    pl_span inside;
     if (query->shadow && walk->at.no_shadow) {
         pl_walk_prune(walk);
         return true;
     }
     counters->box_tests++;
-    pl_gate gate = pl_query_gate(query, states, &at, &t_entry);
-    if (gate == PL_GATE_OPEN) return true;
+    pl_gate gate = pl_query_gate(query, states, &at, &t_entry, &inside);
+    if (gate == PL_GATE_OPEN) {
+        walk->at.payload[ENTER] = inside.enter;
+        walk->at.payload[LEAVE] = inside.leave;
+        return true;
+    }
     pl_walk_prune(walk);
     if (gate == PL_GATE_MISSED) {
         if (walk->at.depth > counters->miss_depth) counters->miss_depth = walk->at.depth;
@@ -86,6 +92,8 @@ bool pl_walk_trace(pl_walk *walk, const pl_scene *scene, pl_counters *counters, 
     memcpy(walk->at.payload, ray->origin, 3 * sizeof(double));
     memcpy(walk->at.payload + 3, ray->direction, 3 * sizeof(double));
     walk->at.payload[STRETCH] = 1.0;
+    walk->at.payload[ENTER] = query->t_min;
+    walk->at.payload[LEAVE] = INFINITY;
     return pl_walk_offer(walk, scene, counters, query, missed);
 }
 

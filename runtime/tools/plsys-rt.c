@@ -31,6 +31,7 @@ static const char usage[] =
     "  --accel A           auto, none, boxes, grid or bvh: same picture, different speed (auto)\n"
     "  --grid NxMxK        voxels of --accel grid (16x16x8)\n"
     "  --antialias A       off, grid=N (centre and NxN sub-cells) or adaptive=DEPTH (off)\n"
+    "  --detail PX         draw what is smaller than PX pixels as a box, 0: nothing (0; 0.5 where a recursion has no end)\n"
     "  --povray-epsilon    POV-Ray's hit and shadow tolerances\n"
     "  --dump              print the bytecode as text instead\n"
     "  --help              this text\n";
@@ -89,6 +90,16 @@ static bool parse_accelerator(const char *text, int *accelerator)
     return false;
 }
 
+/* Pixels, of which pl_options takes 0 for automatic and less for none. */
+static bool parse_detail(const char *text, double *detail)
+{
+    char *after;
+    double pixels = strtod(text, &after);
+    if (after == text || *after || !(pixels >= 0.0 && pixels <= 1e6)) return false;
+    *detail = pixels > 0.0 ? pixels : -1.0;
+    return true;
+}
+
 static bool parse_grid(const char *text, uint32_t grid[3])
 {
     int sides[3];
@@ -119,6 +130,9 @@ static bool parse_value(arguments *a, const char *option, const char *value)
                complain("--accel %s: expected auto, none, boxes, grid or bvh", value);
     if (strcmp(option, "--grid") == 0)
         return parse_grid(value, a->options.grid) || complain("--grid %s: expected NxMxK, such as 16x16x8", value);
+    if (strcmp(option, "--detail") == 0)
+        return parse_detail(value, &a->options.detail) ||
+               complain("--detail %s: expected a number of pixels, 0 or more", value);
     if (strcmp(option, "--antialias") == 0)
         return parse_antialias(value, &a->render) ||
                complain("--antialias %s: expected off, grid=N or adaptive=DEPTH", value);

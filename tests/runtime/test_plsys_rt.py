@@ -53,6 +53,18 @@ def test_antialiasing_is_the_binding_s(plsys_rt, tree, tmp_path):
     np.testing.assert_array_equal(read_pfm(output), expected)
 
 
+@pytest.mark.parametrize("name, detail", [("tree", "0"), ("tree", "6.5"), ("fern_endless", "0"), ("fern_endless", "3")])
+def test_the_detail_cut_off_is_the_binding_s(plsys_rt, tmp_path, name, detail):
+    path, output = tmp_path / "scene.plsb", tmp_path / "scene.pfm"
+    path.write_bytes(compile(ROOT / "scenes" / f"{name}.plsys"))
+    done = whole.run(plsys_rt, path, "-o", output, "--size", "64x48", "--detail", detail)
+    assert (done.returncode, done.stderr) == (0, "")
+    with Scene(path.read_bytes(), detail=float(detail)) as scene:
+        expected = scene.render(64, 48)["color"]
+        assert scene.statistics["cut"]["instances"] > 0 or detail == "0"
+    np.testing.assert_array_equal(read_pfm(output), expected)
+
+
 def test_dump_prints_the_disassembly(plsys_rt, tmp_path):
     path = tmp_path / "all.plsb"
     path.write_bytes(one_of_everything().bytes())
@@ -71,7 +83,9 @@ def test_dump_prints_the_disassembly(plsys_rt, tmp_path):
         (["tree.plsb", "-o", "x.pfm", "--threads", "many"], "--threads many: expected a number from 1 to 1024"),
         (["tree.plsb", "-o", "x.pfm", "--accel", "kd"], "--accel kd: expected auto, none, boxes, grid or bvh"),
         (["tree.plsb", "-o", "x.pfm", "--grid", "16x16"], "--grid 16x16: expected NxMxK"),
-            (["tree.plsb", "-o", "x.pfm", "--colour", "red"], "no option '--colour'"),
+        (["tree.plsb", "-o", "x.pfm", "--detail", "fine"], "--detail fine: expected a number of pixels, 0 or more"),
+        (["tree.plsb", "-o", "x.pfm", "--detail", "-1"], "--detail -1: expected a number of pixels, 0 or more"),
+        (["tree.plsb", "-o", "x.pfm", "--colour", "red"], "no option '--colour'"),
         (["tree.plsb", "other.plsb", "-o", "x.pfm"], "one scene at a time"),
         (["missing.plsb", "-o", "x.pfm"], "missing.plsb can't be read: No such file or directory"),
         (["tree.plsb", "-o", "no/where/x.pfm"], "no/where/x.pfm can't be written: No such file or directory"),
