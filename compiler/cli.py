@@ -10,8 +10,12 @@ Example: ``plsys render scenes/tree.plsys -o tree.png``
 from __future__ import annotations
 
 import argparse
+import gc
 import importlib
 import sys
+
+# Objects made before Python looks for cycles among them. Importing and compiling make some ten thousand, which stay.
+GARBAGE_THRESHOLD = 100_000
 
 COMMANDS = {
     "render": "draw a scene",
@@ -38,6 +42,7 @@ exit codes: 0 fine, 1 a check failed or pictures differ, 2 bad input."""
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command; the process's exit code."""
+    gc.set_threshold(GARBAGE_THRESHOLD)
     argv = sys.argv[1:] if argv is None else argv
     parser = _parser(argv[0] if argv else None)
     arguments = parser.parse_args(argv)

@@ -9,6 +9,6 @@ Every error is a PlsysRuntimeError with a place and a reason. NumPy is imported 
 """
 
 from .errors import PlsysRuntimeError, RuntimeArgumentError
-from .scene import Batch, Hits, Scene, disassemble
+from .scene import Batch, Hits, Scene, disassemble, quantise
 
-__all__ = ["Batch", "Hits", "PlsysRuntimeError", "RuntimeArgumentError", "Scene", "disassemble"]
+__all__ = ["Batch", "Hits", "PlsysRuntimeError", "RuntimeArgumentError", "Scene", "disassemble", "quantise"]

@@ -85,7 +85,11 @@ CHANNELS = {
     "recursion": ("int32", 1),
     "boxes": ("int32", 1),
     "miss_depth": ("int32", 1),
+    "srgb": ("uint8", 3),
+    "linear16": ("uint16", 3),
 }
+
+ITEM_BYTES = {"uint8": 1, "uint16": 2, "int32": 4, "int64": 8, "float32": 4}
 
 
 class PlChannels(ctypes.Structure):
@@ -113,6 +117,8 @@ class PlStatistics(ctypes.Structure):
         *((f"bytes_{name}", c_uint64) for name in ("program", "meshes", "states", "nodes", "items")),
         ("seconds_states", c_double),
         ("isa", c_int),
+        ("lazy_found", c_uint64),
+        ("seconds_first_pixel", c_double),
     ]
 
 
@@ -125,6 +131,7 @@ _FUNCTIONS = {
     "pl_intersect": (c_bool, [c_void_p, c_size_t, c_void_p, c_void_p, POINTER(PlHits), _ERROR]),
     "pl_occluded": (c_bool, [c_void_p, c_size_t, c_void_p, c_void_p, c_void_p, c_void_p, _ERROR]),
     "pl_render": (c_bool, [c_void_p, POINTER(PlRenderOptions), POINTER(PlChannels), _ERROR]),
+    "pl_quantise": (None, [c_size_t, c_void_p, c_void_p, c_void_p]),
     "pl_scene_statistics": (None, [c_void_p, POINTER(PlStatistics)]),
     "pl_symbol_name": (c_char_p, [c_void_p, c_int32]),
     "pl_rule_place": (c_char_p, [c_void_p, c_int32]),

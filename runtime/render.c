@@ -10,12 +10,14 @@
 
 #include "antialias.h"
 #include "error.h"
+#include "quantise.h"
 
 /* One rendering, shared by its threads. */
 typedef struct pl_job {
     const pl_render_options *options;
     const pl_channels *channels;
-    bool wants_first; /* a channel besides colour is wanted */
+    bool wants_first; /* a channel besides colours is wanted */
+    pl_quantiser quantiser;
     uint32_t columns, tiles;
     atomic_uint next, finished;
     atomic_uint failed; /* the first tile that failed so far; UINT_MAX: none */
@@ -31,11 +33,30 @@ typedef struct pl_worker {
     pthread_t thread;
     bool reports; /* this one calls the progress function */
     bool started;
+    double first_pixel; /* when this one's first pixel was done; 0: none is */
 } pl_worker;
+
+static double seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
 
 static void set_vector(float *channel, size_t pixel, const double *value)
 {
     for (int i = 0; channel && i < 3; i++) channel[3 * pixel + i] = value ? (float)value[i] : 0.0f;
+}
+
+/* A pixel's colour, in single precision and in what picture files have of that. */
+static void write_color(const pl_job *job, size_t pixel, const double color[3])
+{
+    const pl_channels *channels = job->channels;
+    set_vector(channels->color, pixel, color);
+    for (size_t i = 0; channels->srgb && i < 3; i++)
+        channels->srgb[3 * pixel + i] = pl_srgb(&job->quantiser, (float)color[i]);
+    for (size_t i = 0; channels->linear16 && i < 3; i++)
+        channels->linear16[3 * pixel + i] = pl_linear_16((float)color[i]);
 }
 
 static void set_index(int32_t *channel, size_t pixel, uint64_t value)
@@ -90,7 +111,8 @@ static bool render_tile(pl_worker *worker, uint32_t tile, pl_error *error)
             pl_first first;
             if (is_idle(job, tile)) return true;
             if (!pl_sampler_pixel(worker->sampler, x, y, color, job->wants_first ? &first : NULL, error)) return false;
-            set_vector(job->channels->color, pixel, color);
+            if (worker->first_pixel == 0.0) worker->first_pixel = seconds();
+            write_color(job, pixel, color);
             if (job->wants_first) write_first(job->channels, pixel, &first);
         }
     return true;
@@ -147,13 +169,6 @@ static void run(pl_worker *workers, int count)
         if (workers[i].started) pthread_join(workers[i].thread, NULL);
 }
 
-static double seconds(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 static bool render(pl_scene *scene, pl_job *job, const pl_view *view, pl_error *error)
 {
     const double start = seconds();
@@ -163,13 +178,15 @@ static bool render(pl_scene *scene, pl_job *job, const pl_view *view, pl_error *
     if (!workers) return pl_fail_memory(error, "preparing to render");
     bool ok = prepare(workers, count, job, view, error);
     if (ok) run(workers, count);
+    double first_pixel = INFINITY;
     for (int i = 0; i < count; i++) {
+        if (workers[i].first_pixel > 0.0) first_pixel = fmin(first_pixel, workers[i].first_pixel);
         if (workers[i].shader) pl_shader_count(workers[i].shader, scene);
         pl_sampler_destroy(workers[i].sampler);
         pl_shader_destroy(workers[i].shader);
     }
     free(workers);
-    pl_scene_count_seconds(scene, seconds() - start);
+    pl_scene_count_seconds(scene, seconds() - start, first_pixel < INFINITY ? first_pixel - start : 0.0);
     if (ok && atomic_load(&job->cancelled))
         return pl_fail(error, PL_ERROR_CANCELLED, "rendering", "stopped before the picture was complete");
     if (ok && job->error.code != PL_OK) {
@@ -199,6 +216,7 @@ bool pl_render(pl_scene *scene, const pl_render_options *options, const pl_chann
         .failed = UINT_MAX,
         .lock = PTHREAD_MUTEX_INITIALIZER,
     };
+    pl_quantiser_init(&job.quantiser);
     const bool ok = render(scene, &job, &view, error);
     pl_view_free(&view);
     return ok;

@@ -355,10 +355,11 @@ void pl_scene_count(pl_scene *scene, const pl_tracer *tracer, const pl_ray_count
     pthread_mutex_unlock(&scene->lock);
 }
 
-void pl_scene_count_seconds(pl_scene *scene, double trace)
+void pl_scene_count_seconds(pl_scene *scene, double trace, double first_pixel)
 {
     pthread_mutex_lock(&scene->lock);
     scene->statistics.seconds_trace += trace;
+    scene->statistics.seconds_first_pixel = first_pixel;
     pthread_mutex_unlock(&scene->lock);
 }
 
@@ -371,6 +372,7 @@ void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics)
     if (scene->accel != &pl_accel_lazy) return;
     pl_lazy_counts lazy;
     pl_lazy_count(scene->structure, &lazy);
+    statistics->lazy_found = lazy.found;
     statistics->lazy_unfolded = lazy.unfolded;
     statistics->lazy_evicted = lazy.evicted;
     statistics->lazy_states = lazy.states;

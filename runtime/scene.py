@@ -11,15 +11,14 @@ them. A Scene may be used by several threads; after close() every call is a Plsy
 from __future__ import annotations
 
 import ctypes
-import math
-import operator
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
-from .binding import ACCELERATORS, ANTIALIAS, CHANNELS, INSTRUCTION_SETS, PlChannels, PlError, PlHits, PlOptions
-from .binding import PlRenderOptions, PlStatistics, Progress, library, pointer
+from . import arguments
+from .binding import ACCELERATORS, ANTIALIAS, CHANNELS, INSTRUCTION_SETS, PlError, PlHits, PlOptions, PlRenderOptions
+from .binding import PlStatistics, library, pointer
 from .errors import PlsysRuntimeError, RuntimeArgumentError
 
 if TYPE_CHECKING:
@@ -91,16 +90,16 @@ class Scene:
         self._users = 0
         self._closed = False
         self._lock = threading.RLock()  # __del__ may run while this thread holds it
-        data = _bytes(bytecode)
+        data = arguments.bytecode_bytes(bytecode)
         options = PlOptions(
-            accelerator=_choice("accelerator", accelerator, ACCELERATORS),
-            threads=_count("threads", threads, 0, 1024),
-            memory=_count("memory", memory, 0, 2**63 - 1),
+            accelerator=arguments.choice("accelerator", accelerator, ACCELERATORS),
+            threads=arguments.count("threads", threads, 0, 1024),
+            memory=arguments.count("memory", memory, 0, 2**63 - 1),
             povray_epsilon=bool(povray_epsilon),
-            grid=_voxels(grid),
-            isa=_choice("isa", isa, INSTRUCTION_SETS),
-            front_items=_count("front_items", front_items, 0, UNKNOWN),
-            detail=_detail(detail),
+            grid=arguments.voxels(grid),
+            isa=arguments.choice("isa", isa, INSTRUCTION_SETS),
+            front_items=arguments.count("front_items", front_items, 0, UNKNOWN),
+            detail=arguments.detail(detail),
         )
         error = PlError()
         self._handle = library().pl_scene_create(data, len(data), ctypes.byref(options), ctypes.byref(error))
@@ -154,7 +153,7 @@ class Scene:
         """The foremost hit of each ray at t > 0. origins, directions: (n, 3) or (3,), finite, directions not zero."""
         import numpy as np
 
-        origins, directions = _rays(origins, directions)
+        origins, directions = arguments.rays(origins, directions)
         n = len(origins)
         hits = Hits(
             t=np.empty(n),
@@ -177,7 +176,7 @@ class Scene:
         """(n,) bool: whether something stands at 0 < t < distance. distance: (n,), a number, or None for any."""
         import numpy as np
 
-        origins, directions = _rays(origins, directions)
+        origins, directions = arguments.rays(origins, directions)
         n = len(origins)
         if distance is not None:
             try:
@@ -205,37 +204,50 @@ class Scene:
     ) -> dict[str, np.ndarray]:
         """Draw the scene through its camera; arrays by channel, row 0 on top.
 
-        channels: color (h, w, 3) float32, linear and unclipped · depth (h, w) float32, inf: none · normal, position
-        (h, w, 3) float32 · primitive (h, w) int64 · symbol, rule, recursion, boxes, miss_depth (h, w) int32.
+        channels: color (h, w, 3) float32, linear and unclipped · srgb (h, w, 3) uint8, linear16 (h, w, 3) uint16: the same as
+        :func:`quantise` gives them · depth (h, w) float32, inf: none · normal, position (h, w, 3) float32 · primitive (h, w) int64 · symbol, rule, recursion, boxes, miss_depth (h, w) int32.
         antialias: "off", "grid" (centre and samples² sub-cells) or "adaptive" (to depth `samples` where colours differ by
         more than `threshold`). progress: called now and then with the share done; returning False cancels.
         """
         import numpy as np
 
-        width, height = _count("width", width, 1, 2**20), _count("height", height, 1, 2**20)
-        channels = (channels,) if isinstance(channels, str) else tuple(channels)
+        width, height = _sides(width, height)
         planes = {}
-        for name in channels:
-            dtype, components = CHANNELS[_name("channel", name, tuple(CHANNELS))]
+        for name in (channels,) if isinstance(channels, str) else channels:
+            dtype, components = CHANNELS[arguments.name("channel", name, tuple(CHANNELS))]
             planes[name] = np.zeros((height, width) if components == 1 else (height, width, components), dtype)
+        self.render_into(planes, width, height, antialias, samples, threshold, progress)
+        return planes
+
+    def render_into(
+        self,
+        planes: Mapping[str, object],
+        width: int,
+        height: int,
+        antialias: str = "off",
+        samples: int = 0,
+        threshold: float = 0.0,
+        progress: Callable[[float], object] | None = None,
+    ) -> None:
+        """As :meth:`render`, into writable, contiguous buffers of the channels' types: a bytearray, an array. It does
+        without NumPy."""
+        width, height = _sides(width, height)
         raised: list[BaseException] = []
         options = PlRenderOptions(
             width=width,
             height=height,
-            antialias=_choice("antialias", antialias, ANTIALIAS),
-            samples=_count("samples", samples, 0, 256),
+            antialias=arguments.choice("antialias", antialias, ANTIALIAS),
+            samples=arguments.count("samples", samples, 0, 256),
             threshold=float(threshold),
-            progress=_progress(progress, raised),
+            progress=arguments.callback(progress, raised),
         )
-        arrays = PlChannels(**{name: pointer(plane) for name, plane in planes.items()})
-        error = PlError()
+        channels, error = arguments.planes(planes, width * height), PlError()
         with self._open() as handle:
-            done = library().pl_render(handle, ctypes.byref(options), ctypes.byref(arrays), ctypes.byref(error))
+            done = library().pl_render(handle, ctypes.byref(options), ctypes.byref(channels), ctypes.byref(error))
         if raised:
             raise raised[0]
         if not done:
             error.raise_()
-        return planes
 
     # --- what it is made of ---
 
@@ -243,7 +255,7 @@ class Scene:
         """All primitives in derivation order, at most `batch` at a time; memory doesn't grow with their number."""
         import numpy as np
 
-        batch = _count("batch", batch, 1, 2**31)
+        batch = arguments.count("batch", batch, 1, 2**31)
         error = PlError()
         with self._open() as handle:
             unfolding = library().pl_unfold_begin(handle, ctypes.byref(error))
@@ -276,7 +288,7 @@ class Scene:
 
         size = ctypes.c_uint32()
         with self._open() as handle:
-            values = library().pl_scene_texture(handle, _count("texture", index, 0, 2**31 - 1), ctypes.byref(size))
+            values = library().pl_scene_texture(handle, arguments.count("texture", index, 0, 2**31 - 1), ctypes.byref(size))
             if not values:
                 raise RuntimeArgumentError("texture", f"there is no texture {index}")
             return np.array(values[: size.value])
@@ -285,15 +297,16 @@ class Scene:
     def statistics(self) -> dict:
         """Counts and costs so far.
 
-        primitives (that symbols generate; None: more than 2⁶⁴, or unknown as without states), states, depth (symbols on a path), scene_bytes,
-        singular (dropped subtrees), box_tests, primitive_tests, bailout, trace_level, rays {primary, shadow, reflection,
-        transmitted}, seconds {verify, build, trace}, accelerator, threads, detail (the cut-off in pixels, 0: none), cut {instances: rays
-        that ended at a cut instance's box, max_error: the largest error bound of their distance, in scene units}, lazy {unfolded, evicted: states, where there are too
-        many to build; states, bytes, classes: of these in memory now}.
+        primitives (that symbols generate; None: more than 2⁶⁴, or unknown as without states), states, depth (symbols on a
+        path), scene_bytes, singular (dropped subtrees), box_tests, primitive_tests, bailout, trace_level, rays {primary, shadow, reflection,
+        transmitted}, seconds {verify, build, trace, first_pixel: of the last rendering, from its start}, accelerator, threads,
+        detail (the cut-off in pixels, 0: none), cut {instances: rays that ended at a cut instance's box, max_error: the
+        largest error bound of their distance, in scene units}, lazy {unfolded, evicted: states, where there are too many to
+        build; found: times that a ray came to one in memory; states, bytes, classes: of these in memory now}.
 
-        Of bvh: isa (None: another accelerator), front {count, items, instances: items that are one, limit: items that one
-        may have, None: any number}, instances (entered), filtered (primitives tried in single precision). bytes {program,
-        meshes, states, nodes, items} is scene_bytes by structure; seconds["states"] is a part of seconds["build"].
+        Of bvh: isa (None: another accelerator), front {count, items, instances: items that are one, limit: items that one may
+        have, None: any number}, instances (entered), filtered (primitives tried in single precision). bytes {program, meshes,
+        states, nodes, items} is scene_bytes by structure; seconds["states"] is a part of seconds["build"].
         """
         counts = PlStatistics()
         with self._open() as handle:
@@ -323,7 +336,7 @@ class Scene:
 
 def disassemble(bytecode: bytes) -> str:
     """Bytecode as text, one line a node, as ``plsys disassemble`` prints it."""
-    data, error = _bytes(bytecode), PlError()
+    data, error = arguments.bytecode_bytes(bytecode), PlError()
     text = library().pl_disassemble(data, len(data), ctypes.byref(error))
     if not text:
         error.raise_()
@@ -333,89 +346,17 @@ def disassemble(bytecode: bytes) -> str:
         library().pl_free(text)
 
 
-# --- arguments ---
-
-
-def _bytes(bytecode: object) -> bytes:
-    if not isinstance(bytecode, (bytes, bytearray, memoryview)):
-        raise RuntimeArgumentError("bytecode", f"expected bytes, not {type(bytecode).__name__}")
-    return bytes(bytecode)
-
-
-def _name(what: str, value: object, names: tuple[str, ...]) -> str:
-    if value not in names:
-        raise RuntimeArgumentError(what, f"{value!r} is none of {', '.join(names)}")
-    return value
-
-
-def _choice(what: str, value: object, names: tuple[str, ...]) -> int:
-    return names.index(_name(what, value, names))
-
-
-def _count(what: str, value: object, low: int, high: int) -> int:
-    """An integer of [low, high]; None is 0."""
-    try:
-        number = 0 if value is None else operator.index(value)
-    except TypeError:
-        raise RuntimeArgumentError(what, f"expected an integer, not {value!r}") from None
-    if not low <= number <= high:
-        raise RuntimeArgumentError(what, f"{number} is not between {low} and {high}")
-    return number
-
-
-def _voxels(grid: object) -> tuple[int, int, int]:
-    try:
-        sides = (0, 0, 0) if grid is None else tuple(grid)
-    except TypeError:
-        sides = ()
-    if len(sides) != 3:
-        raise RuntimeArgumentError("grid", f"expected three numbers of voxels, not {grid!r}")
-    return tuple(_count("grid", side, 0 if grid is None else 1, 2**26) for side in sides)
-
-
-def _detail(value: object) -> float:
-    """pl_options' detail: there 0 is automatic and what is below 0 is none."""
-    if value is None:
-        return 0.0
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise RuntimeArgumentError("detail", f"expected a number of pixels, not {value!r}") from None
-    if not 0 <= number < math.inf:
-        raise RuntimeArgumentError("detail", f"{value} isn't a number of pixels, 0 or more")
-    return number or -1.0
-
-
-def _rays(origins, directions) -> tuple[np.ndarray, np.ndarray]:
-    """Two contiguous (n, 3) float64 arrays; one may be a single (3,) vector for all rays."""
+def quantise(linear: np.ndarray, kind: str) -> np.ndarray:
+    """Linear values as picture files of integers have them, floor(clip(x, 0, 1)·most + ½): "srgb" uint8 (IEC 61966-2-1)
+    or "linear16" uint16, in the array's shape."""
     import numpy as np
 
-    arrays = []
-    for name, value in (("origins", origins), ("directions", directions)):
-        try:
-            array = np.asarray(value, np.float64)
-        except (TypeError, ValueError):
-            raise RuntimeArgumentError(name, "expected numbers in an array of shape (n, 3)") from None
-        if array.ndim not in (1, 2) or array.shape[-1] != 3:
-            raise RuntimeArgumentError(name, f"expected an array of shape (n, 3), not {array.shape}")
-        arrays.append(array.reshape(-1, 3) if array.ndim == 1 else array)
-    first, second = arrays
-    if len(first) != len(second) and 1 not in (len(first), len(second)):
-        raise RuntimeArgumentError("rays", f"{len(first)} origins, but {len(second)} directions")
-    n = 0 if 0 in (len(first), len(second)) else max(len(first), len(second))
-    return tuple(np.ascontiguousarray(np.broadcast_to(array, (n, 3)) if n else array[:0]) for array in arrays)
+    linear = np.ascontiguousarray(linear, np.float32)
+    values = np.empty(linear.shape, CHANNELS[arguments.name("kind", kind, ("srgb", "linear16"))][0])
+    outputs = (pointer(values), None) if kind == "srgb" else (None, pointer(values))
+    library().pl_quantise(linear.size, pointer(linear), *outputs)
+    return values
 
 
-def _progress(progress: Callable[[float], object] | None, raised: list[BaseException]) -> Progress:
-    """A C callback; what Python raises in it cancels and is raised again by the caller."""
-    if progress is None:
-        return Progress()
-
-    def call(_: object, done: float) -> bool:
-        try:
-            return progress(done) is not False
-        except BaseException as error:  # KeyboardInterrupt too: it must not vanish in C
-            raised.append(error)
-            return False
-
-    return Progress(call)
+def _sides(width: object, height: object) -> tuple[int, int]:
+    return arguments.count("width", width, 1, 2**20), arguments.count("height", height, 1, 2**20)

@@ -20,7 +20,7 @@ LAYERS = [
     ["derive.h", "state.h", "reach.h", "cut.h", "interval.h", "class.h"],
     ["scene.h"],
     ["accel/*.h"],
-    ["texture.h", "light.h", "camera.h", "shade.h"],
+    ["texture.h", "light.h", "camera.h", "shade.h", "quantise.h"],
     ["render.h", "antialias.h"],
 ]
 SHADING = ["texture.c", "light.c", "camera.c", "shade.c", "render.c", "antialias.c"]

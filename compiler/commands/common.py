@@ -7,7 +7,6 @@ A command's ``run`` raises; :func:`report_errors` prints the message (and, with 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import sys
@@ -82,6 +81,8 @@ def show_diagnostics(diagnostics) -> None:
 
 
 def print_json(value: object) -> None:
+    import json
+
     print(json.dumps(value, indent=2, allow_nan=False))
 
 

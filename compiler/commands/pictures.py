@@ -1,9 +1,13 @@
-"""Pictures on disk, through OpenImageIO: linear float arrays in, an image file out.
+"""Pictures on disk, through OpenImageIO: pixels in, an image file out.
 
-Ordinary formats (png, jpg, …) get 8-bit sRGB; ``linear16`` gives 16-bit linear values, for comparison with other
-renderers; formats that hold floats (exr, hdr, pfm, tif) get linear floats.
+Formats that hold floats (exr, hdr, pfm, tif) get linear floats, others (png, jpg, …) 8-bit sRGB; ``linear16`` gives
+16-bit linear values, for comparison with other renderers. OpenImageIO is imported when something is written, NumPy only for
+arrays: each costs more than drawing a small scene.
 
-Example: ``write_picture("tree.png", color, metadata={"Software": "plsys"})`` with color (height, width, 3) float32.
+Example::
+
+    channel = stored_channel("tree.png")                       # "srgb": what the runtime is asked for
+    write_pixels("tree.png", pixels, channel, metadata={"Software": "plsys"})      # (height, width, 3) uint8
 """
 
 from __future__ import annotations
@@ -19,31 +23,64 @@ if TYPE_CHECKING:
 
 FLOAT_FORMATS = (".exr", ".tif", ".tiff", ".hdr", ".pfm")
 
+# Formats that OpenImageIO writes however it was built, so that it needn't be asked.
+USUAL_FORMATS = (".png", ".exr", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".bmp")
+
+# The runtime's channel → OpenImageIO's names of the type and of the colour space.
+STORED = {"color": ("float", "lin_rec709"), "srgb": ("uint8", "sRGB"), "linear16": ("uint16", "lin_rec709")}
+
+# Of 1 to 9. Beyond it rendered pictures become a tenth smaller in twice the time.
+PNG_COMPRESSION = 3
+
+
+def stored_channel(path: str | Path, linear16: bool = False) -> str:
+    """The channel of the runtime that a file named like ``path`` holds: "color", "srgb" or "linear16"."""
+    if linear16:
+        return "linear16"
+    return "color" if Path(path).suffix.lower() in FLOAT_FORMATS else "srgb"
+
 
 def write_picture(
     path: str | Path,
     color: np.ndarray,
     *,
-    linear16: bool = False,
     metadata: dict[str, str] | None = None,
     channels: tuple[str, ...] = ("R", "G", "B"),
 ) -> None:
-    """Write ``color`` (height, width, len(channels)), linear values, to ``path``.
+    """As :func:`write_pixels` for ``color`` (height, width, len(channels)), linear values of any kind of number."""
+    import numpy as np
+
+    channel = stored_channel(path)
+    if channel == "color":
+        pixels = np.ascontiguousarray(color, np.float32)
+    else:
+        from ...runtime import quantise
+
+        pixels = quantise(color, channel)
+    write_pixels(path, pixels, channel, metadata=metadata, channels=channels)
+
+
+def write_pixels(
+    path: str | Path,
+    pixels: memoryview | np.ndarray,
+    channel: str,
+    *,
+    metadata: dict[str, str] | None = None,
+    channels: tuple[str, ...] = ("R", "G", "B"),
+) -> None:
+    """Write ``pixels``, a contiguous buffer of shape (height, width, len(channels)) and of the type that the runtime's
+    ``channel`` has, to ``path``.
 
     Raises PlsysError when the format is unknown or the file can't be written; then no file is left."""
-    import numpy as np
     import OpenImageIO as oiio
 
     path = Path(path)
-    if path.suffix.lower() in FLOAT_FORMATS and not linear16:
-        pixels, kind, space = np.ascontiguousarray(color, np.float32), "float", "lin_rec709"
-    elif linear16:
-        pixels, kind, space = quantise(color, 65535).astype(np.uint16), "uint16", "lin_rec709"
-    else:
-        pixels, kind, space = quantise(srgb_from_linear(color), 255).astype(np.uint8), "uint8", "sRGB"
-    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind)
+    kind, space = STORED[channel]
+    height, width, _ = memoryview(pixels).shape
+    spec = oiio.ImageSpec(width, height, len(channels), kind)
     spec.channelnames = channels
     spec.attribute("oiio:ColorSpace", space)
+    spec.attribute("png:compressionLevel", PNG_COMPRESSION)
     for name, value in (metadata or {}).items():
         spec.attribute(name, value)
     with written_whole(path) as temporary:
@@ -57,26 +94,13 @@ def write_picture(
 
 def check_format(path: str | Path) -> None:
     """PlsysError unless OpenImageIO writes files named like ``path``: asked before any work is done."""
+    suffix = Path(path).suffix.lower()
+    if suffix in USUAL_FORMATS:
+        return
     import OpenImageIO as oiio
 
-    suffix = Path(path).suffix.lower().lstrip(".")
     formats = dict(entry.split(":") for entry in oiio.get_string_attribute("extension_list").split(";") if entry)
     writable = set(oiio.get_string_attribute("output_format_list").split(","))
     known = {extension for name, extensions in formats.items() if name in writable for extension in extensions.split(",")}
-    if suffix not in known:
-        raise PlsysError(f"don't know the picture format '.{suffix}'; use .png, .jpg, .exr or .tif", str(path))
-
-
-def quantise(values: np.ndarray, maximum: int) -> np.ndarray:
-    """``floor(clip(x, 0, 1)·maximum + ½)``: what POV-Ray does too."""
-    import numpy as np
-
-    return np.floor(np.clip(values.astype(np.float64), 0, 1) * maximum + 0.5)
-
-
-def srgb_from_linear(linear: np.ndarray) -> np.ndarray:
-    """IEC 61966-2-1's transfer function."""
-    import numpy as np
-
-    x = np.clip(linear.astype(np.float64), 0, 1)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+    if suffix.lstrip(".") not in known:
+        raise PlsysError(f"don't know the picture format '{suffix}'; use .png, .jpg, .exr or .tif", str(path))

@@ -7,16 +7,20 @@ extra channels go into the same .exr file, or beside other formats into files na
 from __future__ import annotations
 
 import argparse
-import resource
 import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..reading.diagnostics import PlsysError
-from .common import add_scene_arguments, build_scene, json_integer, print_json, size
+from .common import add_scene_arguments, build_scene, print_json, size
 
 ACCELERATORS = ("auto", "none", "boxes", "grid", "bvh")
 ANTIALIAS = "off, grid=N (centre and N×N sub-cells), or adaptive[=DEPTH[,THRESHOLD]]"
+
+# Seconds of rendering without a progress bar.
+PATIENCE = 0.5
 
 # Channel name → the names of its components in a file; `picture1` is made from two of the runtime's channels.
 AOVS = {
@@ -52,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--detail", type=pixels, metavar="PX", help="draw what is smaller than PX pixels as a box (0: nothing; default: 0, but 0.5 where a recursion has no end)"
     )
     parser.add_argument("--explain", action="store_true", help="say what was built, and what was left out and why")
+    parser.add_argument("--statistics", action="store_true", help="print counts of rays and tests, seconds and bytes")
 
 
 def memory(text: str) -> int:
@@ -115,6 +120,7 @@ def aov_names(text: str) -> tuple[str, ...]:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    from . import render_facts
     from .pictures import check_format
 
     started = time.perf_counter()
@@ -136,20 +142,22 @@ def run(arguments: argparse.Namespace) -> int:
         grid=arguments.grid,
         detail=arguments.detail,
     ) as scene:
+        before_trace = time.perf_counter()
         image = _render(scene, arguments)
         statistics = scene.statistics
-        before_write = time.perf_counter()
-        _write(arguments, image, statistics)
+    before_write = time.perf_counter()
+    _write(arguments, image, statistics)
     seconds |= {name: statistics["seconds"][name] for name in ("verify", "states", "build", "trace")}
     seconds["write"] = time.perf_counter() - before_write
-    facts = _facts(arguments, statistics, seconds, left_out)
+    seconds["first_pixel"] = before_trace - started + statistics["seconds"]["first_pixel"]
+    facts = render_facts.facts(arguments, statistics, seconds, left_out)
     if arguments.json:
         print_json(facts)
-    elif arguments.explain:
-        for row in _built(statistics):
-            print("built: {:<12} {:>14,} bytes  {}".format(*row))
-        for row in facts["left_out"]:
-            print(f"left out: {row['what']}: {row['why']}")
+        return 0
+    if arguments.explain:
+        print("\n".join(render_facts.explanation(statistics, facts)))
+    if arguments.statistics:
+        print("\n".join(render_facts.table(facts)))
     return 0
 
 
@@ -171,27 +179,50 @@ def _bytecode(arguments: argparse.Namespace) -> tuple[bytes, list]:
 
 
 def _render(scene, arguments: argparse.Namespace) -> dict:
-    """The arrays of the runtime by channel, with a progress bar on a terminal."""
+    """The runtime's planes by channel: a memoryview of shape (height, width, 3), or arrays where there are extra ones."""
+    from .pictures import stored_channel
+
     width, height = arguments.size
     kind, samples, threshold = arguments.antialias
-    channels = {"color"}
+    options = dict(antialias=kind, samples=samples, threshold=threshold)
+    channels = {stored_channel(arguments.output, arguments.linear16)}
     for name in arguments.aov:
-        channels |= {"miss_depth", "primitive"} if name == "picture1" else {name}
-    options = dict(antialias=kind, samples=samples, threshold=threshold, channels=tuple(sorted(channels)))
-    if not sys.stderr.isatty():
-        return scene.render(width, height, **options)
-    from rich.console import Console
-    from rich.progress import Progress
+        channels |= {"miss_depth", "primitive", "color"} if name == "picture1" else {name}
+    with _progress(arguments) as progress:
+        if arguments.aov:
+            return scene.render(width, height, channels=tuple(sorted(channels)), progress=progress, **options)
+        (channel,) = channels
+        code, size = {"color": ("f", 4), "srgb": ("B", 1), "linear16": ("H", 2)}[channel]
+        pixels = bytearray(3 * width * height * size)
+        scene.render_into({channel: pixels}, width, height, progress=progress, **options)
+        return {channel: memoryview(pixels).cast(code, (height, width, 3))}
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(Path(arguments.scene).name, total=1.0)
-        return scene.render(width, height, progress=lambda done: bar.update(task, completed=done), **options)
+
+@contextmanager
+def _progress(arguments: argparse.Namespace) -> Iterator[Callable[[float], None] | None]:
+    """What draws a progress bar on a terminal, once drawing takes so long that the bar is worth its import."""
+    started, bars = time.monotonic(), []
+
+    def show(done: float) -> None:
+        if not bars and time.monotonic() - started > PATIENCE:
+            from rich.console import Console
+            from rich.progress import Progress
+
+            bars.append(Progress(console=Console(stderr=True), transient=True))
+            bars[0].add_task(Path(arguments.scene).name, total=1.0)
+            bars[0].start()
+        for bar in bars:
+            bar.update(bar.task_ids[0], completed=done)
+
+    try:
+        yield show if sys.stderr.isatty() else None
+    finally:
+        for bar in bars:
+            bar.stop()
 
 
 def _write(arguments: argparse.Namespace, image: dict, statistics: dict) -> None:
-    import numpy as np
-
-    from .pictures import write_picture
+    from .pictures import stored_channel, write_picture, write_pixels
 
     metadata = {
         "Software": "plsys",
@@ -201,14 +232,16 @@ def _write(arguments: argparse.Namespace, image: dict, statistics: dict) -> None
         "plsys:primitives": str(statistics["primitives"]),
         "ImageDescription": f"{arguments.scene}, rendered by plsys",
     }
-    layers = {name: _layer(name, image) for name in arguments.aov}
     output = Path(arguments.output)
-    if output.suffix.lower() == ".exr" and not arguments.linear16:
+    channel = stored_channel(output, arguments.linear16)
+    layers = {name: _layer(name, image) for name in arguments.aov}
+    if layers and output.suffix.lower() == ".exr" and not arguments.linear16:
+        import numpy as np
+
         names = ("R", "G", "B") + tuple(n for name in layers for n in AOVS[name])
-        pixels = np.concatenate([image["color"], *layers.values()], axis=2)
-        write_picture(output, pixels, metadata=metadata, channels=names)
+        write_picture(output, np.concatenate([image["color"], *layers.values()], axis=2), metadata=metadata, channels=names)
         return
-    write_picture(output, image["color"], linear16=arguments.linear16, metadata=metadata)
+    write_pixels(output, image[channel], channel, metadata=metadata)
     for name, layer in layers.items():
         if name == "picture1":
             write_picture(output.with_name(f"{output.stem}.{name}{output.suffix}"), layer, metadata=metadata)
@@ -242,54 +275,3 @@ def _picture1(image: dict):
     tint = np.where(odd, np.float32([1.0, 0.25, 0.2]), np.float32([0.2, 0.35, 1.0]))
     missed = (image["primitive"] < 0)[..., None]
     return np.where(missed, brightness[..., None] * tint, image["color"]).astype(np.float32)
-
-
-def _built(statistics: dict) -> list[tuple[str, int, str]]:
-    """(structure, bytes, what it holds) of what the scene needed."""
-    front, size, seconds = statistics["front"], statistics["bytes"], statistics["seconds"]
-    rows = [("program", size["program"], f"verified in {seconds['verify']:.4f} s")]
-    if size["meshes"]:
-        rows.append(("meshes", size["meshes"], "boxes over triangles"))
-    if size["states"]:
-        rows.append(("states", size["states"], f"{statistics['states']} in {seconds['states']:.4f} s"))
-    if front["count"]:
-        limit = "any number" if front["limit"] is None else f"at most {front['limit']:,}"
-        build = seconds["build"] - seconds["states"]
-        rows.append(("front items", size["items"], f"{front['items']:,}, {front['instances']:,} of them instances"))
-        rows.append(
-            ("front nodes", size["nodes"], f"of {front['count']:,} fronts with {limit} items each, in {build:.4f} s; {statistics['isa']}")
-        )
-    return rows
-
-
-def _facts(arguments: argparse.Namespace, statistics: dict, seconds: dict, left_out: list) -> dict:
-    width, height = arguments.size
-    return {
-        "scene": arguments.scene,
-        "width": width,
-        "height": height,
-        "accelerator": statistics["accelerator"],
-        "povray_epsilon": arguments.povray_epsilon,
-        "primitives": json_integer(statistics["primitives"]),
-        "states": statistics["states"],
-        "detail": statistics["detail"],
-        "cut": statistics["cut"],
-        "lazy": statistics["lazy"],
-        "rays": statistics["rays"],
-        "isa": statistics["isa"],
-        "front": statistics["front"],
-        "tests": {
-            "nodes": statistics["box_tests"] // 8 if statistics["isa"] else statistics["box_tests"],
-            "instances": statistics["instances"],
-            "primitives_filtered": statistics["filtered"],
-            "primitives": statistics["primitive_tests"],
-        },
-        "seconds": {name: round(value, 6) for name, value in seconds.items()},
-        "memory": {
-            "scene_bytes": statistics["scene_bytes"],
-            **{f"{name}_bytes": value for name, value in statistics["bytes"].items()},
-            "peak_rss_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
-        },
-        "left_out": [{"what": row.what, "why": row.why} for row in left_out],
-        "image": arguments.output,
-    }

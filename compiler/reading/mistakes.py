@@ -66,24 +66,25 @@ _NAMING = (
     "step",
 )
 
+# Patterns are compiled when something went wrong: most texts are right.
 # What may stand outside of strings and comments.
-_KNOWN = re.compile(r"[A-Za-z0-9_\s\"#%()*+,\-./:;<=>?\[\]{}!&|→\u00C0-\u1FFF\u2C00-\uD7FF]")
+_KNOWN = r"[A-Za-z0-9_\s\"#%()*+,\-./:;<=>?\[\]{}!&|→\u00C0-\u1FFF\u2C00-\uD7FF]"
 
 # Strings and comments inside broken text, of which only the rest is judged.
-_MASKED = re.compile(r'"[^"\r\n]*"|//[^\r\n]*|/\*.*?\*/', re.DOTALL)
+_MASKED = r'(?s)"[^"\r\n]*"|//[^\r\n]*|/\*.*?\*/'
 
-_OPERATOR = re.compile(r"(?!\+\+|--)[-+*/%=<>!&|?]+")
+_OPERATOR = r"(?!\+\+|--)[-+*/%=<>!&|?]+"
 
 # Habits from other languages: the text that went wrong → message and hint.
 _HABITS = (
-    (re.compile(r"\*/"), "this '*/' ends no comment", "comments don't nest: the first */ ended it"),
-    (re.compile(r"\^"), "'^' is no operator", "write pow(a, b)"),
-    (re.compile(r"\band\b"), "'and' is no operator", "write &&"),
-    (re.compile(r"\bor\b"), "'or' is no operator", "write ||"),
-    (re.compile(r"\bnot\b"), "'not' is no operator", "write !"),
-    (re.compile(r"(?<![&])&(?!&)"), "'&' is no operator", "write &&"),
-    (re.compile("[−–—]"), "this dash is not the minus sign", "write -"),
-    (re.compile("[“”„«»]|'"), "this is not the quotation mark of a text", 'write "'),
+    (r"\*/", "this '*/' ends no comment", "comments don't nest: the first */ ended it"),
+    (r"\^", "'^' is no operator", "write pow(a, b)"),
+    (r"\band\b", "'and' is no operator", "write &&"),
+    (r"\bor\b", "'or' is no operator", "write ||"),
+    (r"\bnot\b", "'not' is no operator", "write !"),
+    (r"(?<![&])&(?!&)", "'&' is no operator", "write &&"),
+    ("[−–—]", "this dash is not the minus sign", "write -"),
+    ("[“”„«»]|'", "this is not the quotation mark of a text", 'write "'),
 )
 
 # What stands in an operation's arguments only with brackets round it.
@@ -242,12 +243,13 @@ def _expected(node: Node | None) -> str:
 
 def unexpected(reading: Reading, node: Node, context: Node | None = None) -> Diagnostic:
     """The message for an ERROR node. ``context`` is the node that it should have become part of."""
-    text = _MASKED.sub(lambda match: " " * len(match[0].encode()), reading.text(node))
+    text = re.sub(_MASKED, lambda match: " " * len(match[0].encode()), reading.text(node))
     for pattern, message, hint in _HABITS:
-        if match := pattern.search(text):
+        if match := re.search(pattern, text):
             return _diagnostic("syntax", _part(reading, node, match), message, hint)
+    known = re.compile(_KNOWN)
     for match in re.finditer(r".", text):
-        if not _KNOWN.match(match[0]):
+        if not known.match(match[0]):
             message = f"the character '{match[0]}' has no meaning here"
             return _diagnostic("syntax", _part(reading, node, match), message, "remove it")
     if (opener := _last_open(text)) >= 0:
@@ -261,7 +263,7 @@ def unexpected(reading: Reading, node: Node, context: Node | None = None) -> Dia
     if inside in ("operation", "statements") and COMPARISON.fullmatch(match[0]):
         hint = IN_BRACKETS
     span = _part(reading, node, match)
-    if _OPERATOR.fullmatch(match[0]) and re.match(rb"[ \t]*([;)}\],\r\n]|$)", reading.data[span.end :]):
+    if re.fullmatch(_OPERATOR, match[0]) and re.match(rb"[ \t]*([;)}\],\r\n]|$)", reading.data[span.end :]):
         return _diagnostic("missing", span, f"nothing stands after this '{match[0]}'", hint)
     return _diagnostic("syntax", span, f"'{match[0][:30]}' is unexpected here", hint)
 

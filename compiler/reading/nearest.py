@@ -9,7 +9,6 @@ Example: ``nearest("Tre", ["Tree", "Bush"])`` is ``"did you mean 'Tree'?"``.
 
 from __future__ import annotations
 
-import difflib
 from bisect import bisect_left, bisect_right, insort
 from collections.abc import Iterable, Sequence
 from os.path import commonprefix
@@ -52,6 +51,8 @@ def nearest_of(name: str, indexes: Sequence[NameIndex]) -> str:
 
 
 def _hint(name: str, names: list[str]) -> str:
+    import difflib  # only for who mistypes
+
     matches = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return f"did you mean '{matches[0]}'?" if matches else ""
 

@@ -53,7 +53,7 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_unfolder *unfolder, uint32_t
 void pl_lazy_release(pl_lazy_state *state);
 
 typedef struct pl_lazy_counts {
-    uint64_t states, bytes, unfolded, evicted, classes, classes_emptied;
+    uint64_t states, bytes, found, unfolded, evicted, classes, classes_emptied;
 } pl_lazy_counts;
 void pl_lazy_count(pl_lazy_cache *cache, pl_lazy_counts *counts);
 

@@ -14,7 +14,7 @@ typedef struct shard {
     pl_lazy_state **buckets;
     uint32_t bucket_count, hand;
     size_t bytes, limit;
-    uint64_t states, unfolded, evicted;
+    uint64_t states, found, unfolded, evicted;
 } shard;
 
 struct pl_lazy_cache {
@@ -370,6 +370,7 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_unfolder *u, uint32_t symbol
     if (ok) {
         pthread_mutex_lock(&s->lock);
         pl_lazy_state *known = find(s, hash, symbol, u->key.data, u->key.count);
+        s->found += known != NULL;
         pthread_mutex_unlock(&s->lock);
         if (known) return known;
         pl_walk_restart(&u->walk, symbol == UINT32_MAX ? 0 : symbol, scope ? &u->scope : NULL);
@@ -394,6 +395,7 @@ void pl_lazy_count(pl_lazy_cache *cache, pl_lazy_counts *counts)
         pthread_mutex_lock(&s->lock);
         counts->states += s->states;
         counts->bytes += s->bytes;
+        counts->found += s->found;
         counts->unfolded += s->unfolded;
         counts->evicted += s->evicted;
         pthread_mutex_unlock(&s->lock);

@@ -95,7 +95,8 @@ typedef struct pl_render_options {
     void *context;
 } pl_render_options;
 
-/* Planes of height*width pixels, row 0 on top, each may be NULL. color is linear rgb (3 a pixel), never clipped.
+/* Planes of height*width pixels, row 0 on top, each may be NULL. color is linear rgb (3 a pixel), never clipped; srgb and
+ * linear16 are its values as pl_quantise gives them.
  * depth: distance along the unit primary ray (INFINITY: none); normal, position: world space, of the foremost hit (0: none);
  * boxes: box tests of the primary ray; miss_depth: the deepest recursion depth at which the ray missed a box (paper,
  * Picture 1; 0: never entered one). With antialiasing the extra channels are the pixel centre's. */
@@ -110,9 +111,15 @@ typedef struct pl_channels {
     int32_t *recursion;
     int32_t *boxes;
     int32_t *miss_depth;
+    uint8_t *srgb;
+    uint16_t *linear16;
 } pl_channels;
 
 PL_API bool pl_render(pl_scene *scene, const pl_render_options *options, const pl_channels *channels, pl_error *error);
+
+/* n linear values as picture files of integers have them: floor(clip(x, 0, 1) * most + 1/2), NaN as 0; srgb (IEC 61966-2-1)
+ * and linear16 may be NULL. */
+PL_API void pl_quantise(size_t n, const float *linear, uint8_t *srgb, uint16_t *linear16);
 
 /* Counts and costs so far. */
 typedef struct pl_statistics {
@@ -136,6 +143,8 @@ typedef struct pl_statistics {
     uint64_t bytes_program, bytes_meshes, bytes_states, bytes_nodes, bytes_items; /* scene_bytes by structure */
     double seconds_states; /* of seconds_build */
     int isa;               /* pl_isa of bvh's kernel; 0: another accelerator */
+    uint64_t lazy_found;   /* times that a ray came to a state that was in memory already */
+    double seconds_first_pixel; /* from the last rendering's start to its first pixel's colour; 0: nothing rendered */
 } pl_statistics;
 
 PL_API void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics);

@@ -12,7 +12,7 @@ import pytest
 from assembly import Assembly, one_of_everything
 
 from plsys.compiler import compile
-from plsys.runtime import PlsysRuntimeError, RuntimeArgumentError, Scene, disassemble
+from plsys.runtime import PlsysRuntimeError, RuntimeArgumentError, Scene, disassemble, quantise
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -147,7 +147,8 @@ def test_statistics_count_rays_and_costs(tree):
     assert statistics["rays"]["primary"] == 32 * 24 and statistics["primitives"] == 65
     assert statistics["accelerator"] == "bvh" and statistics["threads"] == 2
     assert statistics["box_tests"] > 0 and statistics["seconds"]["trace"] > 0
-    assert set(statistics["seconds"]) == {"verify", "states", "build", "trace"}
+    assert set(statistics["seconds"]) == {"verify", "states", "build", "trace", "first_pixel"}
+    assert 0 < statistics["seconds"]["first_pixel"] <= statistics["seconds"]["trace"]
 
 
 @pytest.mark.parametrize("data", [b"", b"PLSB", b"x" * 100])
@@ -158,6 +159,49 @@ def test_what_is_no_bytecode_is_one_clear_error(data):
         assert caught.value.kind == "bytecode" and caught.value.reason
     with pytest.raises(RuntimeArgumentError, match="bytecode: expected bytes, not str"):
         Scene("tree.plsb")
+
+
+def test_colours_as_picture_files_have_them(tree):
+    with Scene(tree) as scene:
+        image = scene.render(64, 48, channels=("color", "srgb", "linear16"))
+    linear = np.clip(image["color"].astype(np.float64), 0, 1)
+    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    assert image["srgb"].dtype == np.uint8 and image["linear16"].dtype == np.uint16
+    np.testing.assert_array_equal(image["srgb"], np.floor(255 * srgb + 0.5))
+    np.testing.assert_array_equal(image["linear16"], np.floor(65535 * linear + 0.5))
+    assert len(np.unique(image["srgb"])) > 10
+
+
+def test_every_byte_has_its_stretch_of_light():
+    linear = np.linspace(-0.1, 1.1, 100_001, dtype=np.float32)
+    clipped = np.clip(linear.astype(np.float64), 0, 1)
+    srgb = np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
+    np.testing.assert_array_equal(quantise(linear, "srgb"), np.floor(255 * srgb + 0.5))
+    np.testing.assert_array_equal(quantise(linear, "linear16"), np.floor(65535 * clipped + 0.5))
+    odd = np.float32([[np.nan, np.inf, -np.inf], [0, 1, 1e-30]])
+    assert quantise(odd, "srgb").tolist() == [[0, 255, 0], [0, 255, 0]]
+    assert quantise(odd, "linear16").tolist() == [[0, 65535, 0], [0, 65535, 0]]
+    with pytest.raises(RuntimeArgumentError, match="kind: 'gamma' is none of srgb, linear16"):
+        quantise(odd, "gamma")
+
+
+def test_pictures_go_into_any_buffer_that_fits(tree):
+    with Scene(tree) as scene:
+        expected = scene.render(16, 12, channels=("color", "depth", "srgb"))
+        planes = {"color": bytearray(16 * 12 * 12), "depth": np.empty((12, 16), np.float32), "srgb": bytearray(16 * 12 * 3)}
+        scene.render_into(planes, 16, 12)
+        for name, plane in planes.items():
+            assert bytes(plane) == expected[name].tobytes()
+        for buffer, message in (
+            (bytearray(5), "srgb: a buffer of 5 bytes, but the picture takes 576"),
+            (bytes(576), "srgb: expected a writable, contiguous buffer"),
+            (np.empty((12, 32, 3), np.uint8)[:, ::2], "srgb: expected a writable, contiguous buffer"),
+            (None, "srgb: expected a writable, contiguous buffer"),
+        ):
+            with pytest.raises(RuntimeArgumentError, match=message):
+                scene.render_into({"srgb": buffer}, 16, 12)
+        with pytest.raises(RuntimeArgumentError, match="channel: 'colour' is none of color, depth"):
+            scene.render_into({"colour": bytearray(576)}, 16, 12)
 
 
 def test_progress_can_cancel_and_its_exceptions_come_back(tree):

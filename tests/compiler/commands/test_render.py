@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
@@ -31,10 +32,55 @@ def test_render_json(tmp_path, capsys):
     assert told["accelerator"] == "bvh" and told["povray_epsilon"] is False
     assert told["primitives"] == 2049 and told["states"] == 13
     assert told["rays"]["primary"] == 48 * 36 and told["rays"]["shadow"] > 0 and told["rays"]["reflection"] == 0
-    assert {"read", "verify", "build", "trace", "write"} <= set(told["seconds"])
+    assert set(told["seconds"]) == {"read", "verify", "states", "build", "trace", "write", "first_pixel"}
+    assert told["seconds"]["read"] < told["seconds"]["first_pixel"] < sum(told["seconds"].values())
     assert told["memory"]["scene_bytes"] > 0 and told["memory"]["peak_rss_bytes"] > 1e6
     assert all(set(row) == {"what", "why"} for row in told["left_out"])
     assert told["image"] == str(tmp_path / "t.png")
+
+
+def test_statistics_add_up(tmp_path, capsys):
+    told = facts(capsys, "render", TREE, "-o", str(tmp_path / "t.png"), "--threads", "1", *SMALL)
+    rays, tests, each = sum(told["rays"].values()), told["tests"], told["tests_per_ray"]
+    assert told["threads"] == 1 and told["rays_per_second"] == pytest.approx(rays / told["seconds"]["trace"], rel=0.01)
+    assert set(each) == set(tests) == {"nodes", "instances", "primitives_filtered", "primitives"}
+    assert all(each[name] == pytest.approx(tests[name] / rays, abs=1e-3) for name in tests) and tests["nodes"] > 0
+    parts = [f"{name}_bytes" for name in ("program", "meshes", "states", "nodes", "items")]
+    assert sum(told["memory"][part] for part in parts) == told["memory"]["scene_bytes"]
+    assert told["front"]["items"] > 0 and told["lazy"]["found"] == told["lazy"]["unfolded"] == 0
+    assert told["ended"] == {"bailout": 0, "trace_level": 0}
+
+
+def test_statistics_of_states_that_are_unfolded_when_rays_come(tmp_path, capsys):
+    unique = ["scenes/forest.plsys", "-D", "unique=1", "-D", "order=4", "-o", str(tmp_path / "t.png")]
+    lazy = facts(capsys, "render", *unique, *SMALL)["lazy"]
+    assert lazy["found"] > 0 and lazy["unfolded"] >= lazy["states"] > 0
+    assert main(["render", *unique, "--statistics", *SMALL]) == 0
+    assert re.search(r"^states unfolded +[\d,]+ ", capsys.readouterr().out, re.MULTILINE)
+
+
+def test_tables_for_the_terminal(tmp_path, capsys):
+    arguments = ["render", TREE, "-o", str(tmp_path / "t.png"), *SMALL]
+    assert main([*arguments, "--explain"]) == 0
+    built = capsys.readouterr().out
+    assert re.search(r"^built: states +[\d,]+ bytes  13 in", built, re.MULTILINE) and "left out: transformation" in built
+    assert main([*arguments, "--statistics"]) == 0
+    table = dict(re.split(r"  +", line)[:2] for line in capsys.readouterr().out.splitlines())
+    assert table["rays, primary"] == "1,728" and table["primitives of the scene"] == "2,049"
+    assert float(table["nodes"].replace(",", "")) > 0 and float(table["seconds, first pixel"]) > 0
+    assert "rays, reflection" not in table
+
+
+def test_small_pictures_start_quickly(tmp_path):
+    """NumPy and rich would take longer to import than this picture takes to draw, and much of the memory."""
+    code = (
+        "import sys; from plsys.compiler.cli import main; status = main(sys.argv[1:])\n"
+        "print(status, {'numpy', 'rich', 'trimesh'} & set(sys.modules))"
+    )
+    for name in ("t.png", "t.exr", "t.tif"):
+        command = [sys.executable, "-c", code, "render", TREE, "-o", str(tmp_path / name), *SMALL]
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.stdout == "0 set()\n", done.stderr
 
 
 def test_formats_hold_the_same_picture(tmp_path, capsys):
