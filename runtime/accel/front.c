@@ -175,22 +175,41 @@ static bool front_of(pl_fronts *fronts, uint32_t state, uint32_t *index)
     return true;
 }
 
+bool pl_front_make(const pl_scene *scene, const pl_compositions *compositions, uint32_t state, uint64_t most,
+                   pl_fronts *sums, pl_front *front, pl_error *error)
+{
+    pl_front_items items = {0};
+    *front = (pl_front){.state = state};
+    set_frame(front, &scene->states.list[state]);
+    bool ok = pl_front_open(compositions, front, most, &items, error);
+    if (ok && (items.primitive_count > PL_REF_INDEX || items.instance_count > PL_REF_INDEX))
+        ok = pl_fail(error, PL_ERROR_LIMIT, "memory", "a front of more than %d items", PL_REF_INDEX);
+    if (ok && !keep(sums, front, &items, scene->threads)) ok = pl_fail_memory(error, "building the fronts");
+    front->instance_count = (uint32_t)items.instance_count;
+    pl_front_items_free(&items);
+    return ok;
+}
+
+void pl_front_free(pl_front *front)
+{
+    free((void *)front->nodes);
+    free((void *)front->primitives);
+    free((void *)front->instances);
+    free((void *)front->opened);
+    free((void *)front->unbounded);
+}
+
+/* The fronts that instances name by their states are listed, to be built later. */
 static bool build_front(pl_scene *scene, pl_fronts *fronts, const pl_compositions *compositions, uint32_t index,
                         pl_error *error)
 {
-    pl_front front = fronts->list[index];
-    pl_front_items items = {0};
-    set_frame(&front, &scene->states.list[front.state]);
-    bool ok = pl_front_open(compositions, &front, fronts->limit_items, &items, error);
-    if (ok && (items.primitive_count > PL_REF_INDEX || items.instance_count > PL_REF_INDEX))
-        ok = pl_fail(error, PL_ERROR_LIMIT, "memory", "a front of more than %d items", PL_REF_INDEX);
-    for (size_t i = 0; ok && i < items.instance_count; i++) {
-        pl_front_instance *instance = &items.instances[i];
-        if (!front_of(fronts, instance->front, &instance->front)) ok = pl_fail_memory(error, "building the fronts");
+    pl_front front;
+    bool ok = pl_front_make(scene, compositions, fronts->list[index].state, fronts->limit_items, fronts, &front, error);
+    for (size_t i = 0; ok && i < front.instance_count; i++) {
+        uint32_t *to = (uint32_t *)&front.instances[i].front;
+        if (!front_of(fronts, *to, to)) ok = pl_fail_memory(error, "building the fronts");
     }
-    if (ok && !keep(fronts, &front, &items, scene->threads)) ok = pl_fail_memory(error, "building the fronts");
     fronts->list[index] = front;
-    pl_front_items_free(&items);
     return ok;
 }
 
@@ -220,14 +239,7 @@ void pl_fronts_destroy(pl_scene *scene)
     pl_fronts *fronts = scene->structure;
     scene->structure = NULL;
     if (!fronts) return;
-    for (uint32_t i = 0; i < fronts->count; i++) {
-        const pl_front *front = &fronts->list[i];
-        free((void *)front->nodes);
-        free((void *)front->primitives);
-        free((void *)front->instances);
-        free((void *)front->opened);
-        free((void *)front->unbounded);
-    }
+    for (uint32_t i = 0; i < fronts->count; i++) pl_front_free(&fronts->list[i]);
     free(fronts->list);
     free(fronts->of_state);
     free(fronts);

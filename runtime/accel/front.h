@@ -72,7 +72,7 @@ typedef struct pl_front {
     const pl_front_instance *instances;
     const pl_opened *opened;
     const pl_ref *unbounded; /* without bounds: always visited */
-    uint32_t unbounded_count;
+    uint32_t unbounded_count, instance_count;
     pl_ref root;             /* PL_NOTHING: no bounded items */
     uint32_t state;
     bool framed;             /* its box is finite; else all items are unbounded */
@@ -149,6 +149,12 @@ size_t pl_front_most_nodes(size_t boxes);
 uint32_t pl_front_tree(pl_boxed *boxes, size_t count, pl_front_node *nodes, pl_ref *root, int threads);
 
 /* --- front.c --- */
+
+/* One front by itself, of a state, with at most `most` items; its instances' .front name states. sums: counts and bytes are
+ * added there. Where it fails the front is to be freed as well. */
+bool pl_front_make(const pl_scene *scene, const pl_compositions *compositions, uint32_t state, uint64_t most,
+                   pl_fronts *sums, pl_front *front, pl_error *error);
+void pl_front_free(pl_front *front);
 
 bool pl_fronts_build(pl_scene *scene, pl_error *error);
 void pl_fronts_destroy(pl_scene *scene);

@@ -254,7 +254,8 @@ static bool add_instance(opening *o, const closed *c)
     for (int r = 0; r < 3; r++)
         for (int column = 0; column < 4; column++)
             items->instances[items->instance_count].columns[3 * column + r] = c->at.to_object.m[4 * r + column];
-    pl_box box = pl_box_under(states, c->item, &c->at.to_parent);
+    /* Where there are cut-offs the whole box may be drawn (cut.h). */
+    pl_box box = states->cuts ? pl_box_map(&c->at.to_parent, &state->box) : pl_box_under(states, c->item, &c->at.to_parent);
     return list_item(o, &box, state->unbounded, pl_ref_of(PL_KIND_INSTANCE, (uint32_t)items->instance_count++));
 }
 
@@ -298,7 +299,8 @@ static uint32_t live_items(const pl_states *states, const pl_state *state)
     return count;
 }
 
-/* Opens as long as at most `most` items result; the rest stays on the heap. A state with one item costs nothing. */
+/* Opens as long as at most `most` items result; the rest stays on the heap. A state with one item costs nothing, unless
+ * there is no end of them. */
 static bool open_all(opening *o, uint32_t state, uint64_t most)
 {
     const pl_states *states = o->compositions->states;
@@ -313,7 +315,7 @@ static bool open_all(opening *o, uint32_t state, uint64_t most)
         closed c = pop(o);
         uint64_t adds = live_items(states, &states->list[c.item->what]);
         uint64_t now = o->counts.primitives + o->heap_count + kept;
-        if (now + adds <= most || adds <= 1) {
+        if (now + adds <= most || (adds <= 1 && !states->list[c.item->what].endless)) {
             ok = open_state(o, &c, c.item->what);
         } else {
             ok = grow(&rest, kept, &rest_capacity, sizeof *rest);
