@@ -103,6 +103,13 @@ def facts_of(block: Block) -> Facts:
     return found
 
 
+def drop_facts(block: Block) -> None:
+    """Let go of what was read from a block that is gone. Syntax nodes name their block and the block has them: that
+    would be garbage in cycles at every key, and the search for it takes longer than a key may."""
+    if block.is_gone:
+        block.__dict__.pop("facts", None)
+
+
 def keep_lost(change: Change) -> None:
     """Definitions that a syntax error has swallowed live on in a block that is broken now, so that a half-typed line
     isn't answered by messages wherever its block is used."""

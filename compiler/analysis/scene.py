@@ -26,7 +26,7 @@ from ..reading.ignore import Ignore, ignores, is_ignored
 from ..reading.resolve_names import ARTICLES, Names, _identity
 from ..reading.source import Source, Span
 from .document import Document, Meaning, Message, Place
-from .facts import Definition, facts_of, keep_lost
+from .facts import Definition, drop_facts, facts_of, keep_lost
 from .namespace import Namespace
 from .pending import Pending
 from .resolving import BlockResolver, Router
@@ -58,7 +58,8 @@ class Scene:
         self._syntax: dict[Block, list[Diagnostic]] = {}
         self._ignoring: dict[Block, None] = {}  # blocks with `plsys-ignore` comments
         self._edited: dict[Block, None] = {}  # blocks to be resolved: the last one first
-        self._dirty: dict[Block, None] = {}  # and then these
+        self._dirty: dict[Block, None] = {}  # then those that use what was edited
+        self._opened: dict[Block, None] = {}  # and then those of a file that was opened, from its start
         self._router = Router(self._messages)
         self._include_messages: dict[Block, list[Diagnostic]] = {}
         self._find_files()
@@ -71,13 +72,22 @@ class Scene:
         self.is_opening |= len(change.added) >= MANY_BLOCKS
 
     def work(self, deadline: float | None = None) -> bool:
-        """Read and resolve what changes have touched, up to ``deadline`` (of time.perf_counter, in seconds). True when
-        nothing is left to do."""
+        """Read and resolve what changes have touched, up to ``deadline`` (of time.perf_counter, in seconds), or up to where
+        only the rest of a file that was opened is left. True when nothing is left to do."""
+        had_edits = bool(self._pending or self._edited or self._dirty)
         if not self.read(deadline):
             return False
-        while self._edited or self._dirty:
-            block = self._edited.popitem()[0] if self._edited else next(iter(self._dirty))
+        while self._edited or self._dirty or self._opened:
+            if self._edited:
+                block = self._edited.popitem()[0]
+            elif self._dirty:
+                block = next(iter(self._dirty))
+            elif had_edits and deadline is not None:
+                return False  # what is known about the edit needs not wait
+            else:
+                block = next(iter(self._opened))
             self._dirty.pop(block, None)
+            self._opened.pop(block, None)
             self._resolve(block)
             if deadline is not None and time.perf_counter() > deadline:
                 return self.is_current
@@ -98,12 +108,12 @@ class Scene:
     def is_current(self) -> bool:
         """Whether all that the last changes touched has been resolved."""
         read = self._reading is None and not self._pending and self._names.is_fresh
-        return read and not self._edited and not self._dirty
+        return read and not (self._edited or self._dirty or self._opened)
 
     def _steps(self) -> Iterator[None]:
         """Reads what is pending, with a pause after each block."""
         while self._pending:
-            change = self._pending.take()
+            change, removed_includes = self._pending.take(), False
             if change.removed:
                 for block in change.added:
                     facts_of(block)
@@ -111,22 +121,24 @@ class Scene:
                 keep_lost(change)
             for block in change.removed:
                 self._forget(block)
+                removed_includes |= b"include" in block.data and bool(facts_of(block).includes)
+                drop_facts(block)
                 yield
-            # A file that was opened is resolved from its start, edits are as they come.
-            waiting = self._dirty if len(change.added) >= MANY_BLOCKS else self._edited
+            waiting = self._opened if len(change.added) >= MANY_BLOCKS else self._edited
             for block in change.added:
                 self._learn(block)
                 waiting[block] = None
                 yield
-            if any(facts_of(block).includes for block in (*change.removed, *change.added) if b"include" in block.data):
+            if removed_includes or any(facts_of(block).includes for block in change.added if b"include" in block.data):
                 self._find_files()
         for block in self._names.refresh():
-            if block is not None and block not in self._edited:
+            if block is not None and block not in self._edited and block not in self._opened:
                 self._dirty[block] = None
             yield
 
     def _forget(self, block: Block) -> None:
-        for table in (self._messages, self._syntax, self.whole, self.general, self.insights, self._edited, self._dirty, self._ignoring):
+        waiting = self._edited, self._dirty, self._opened
+        for table in (self._messages, self._syntax, self.whole, self.general, self.insights, self._ignoring, *waiting):
             table.pop(block, None)
         self._names.forget(block)
         for single in self.singles.values():
@@ -157,10 +169,13 @@ class Scene:
         for definition in facts.definitions:
             # Another block that uses it may have been first, and its messages went with the old ones.
             self._names.renew(definition)
+        resolver = BlockResolver(block, self._router, self.entries, self._names.nearest)
         try:
-            BlockResolver(block, self._router, self.entries, self._names.nearest).run_on(facts)
+            resolver.run_on(facts)
         except RecursionError:
             pass  # the whole-file checks, which have more room, report it
+        finally:
+            resolver.close()
         if not self._messages.get(block, True):
             del self._messages[block]
 

@@ -35,9 +35,10 @@ class Block(Source):
 
     def __init__(self, name: str, data: bytes, path: Path | None, shape: Shape) -> None:
         super().__init__(name, data, path)
-        self.__dict__.update(shape=shape, before=None, after=None)
+        self.__dict__.update(shape=shape, before=None, after=None, is_gone=False)
 
     shape: Shape
+    is_gone: bool  # an edit has removed it
     before: tuple[Block, tuple[int, int, int]] | None
     after: Block | None  # the block that replaced this one
 
@@ -229,8 +230,10 @@ class Text:
         self._line_ends[low + head : high - tail] = [block.line_ends for block in added]
         del self._starts[low + head + 1 :], self._lines[low + head + 1 :]
         self._order = None
-        gone = set(removed)
-        self._loose = [block for block in self._loose if block not in gone]
+        for block in removed:
+            block.__dict__["is_gone"] = True
+        if self._loose:
+            self._loose = [block for block in self._loose if not block.is_gone]
         self._loose += [block for block in added if block.shape.depth > 0 or block.shape.comment]
         return Change(removed, added), head
 
