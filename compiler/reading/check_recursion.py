@@ -13,7 +13,7 @@ from __future__ import annotations
 from . import affine
 from .check_contraction import stays_large
 from .check_scaling import Back, check_scaling, linear_map
-from .check_termination import check_termination, cyclic
+from .check_termination import Writes, check_termination, cyclic
 from .diagnostics import Diagnostics
 from .linear import after, form
 from .model import (
@@ -44,7 +44,7 @@ def check_recursion(model: Model, diagnostics: Diagnostics) -> None:
     seed, names = seed_of(model), reached_symbols(model)
     reached = {name: symbol for name, symbol in model.symbols.items() if name in names}
     found = components({name: entered(symbol) for name, symbol in reached.items()})
-    endless = _endless(reached, found, seed)
+    endless, writes = _endless(reached, found, seed), Writes(model)
     for component in found:
         members = [reached[name] for name in reached if name in component]
         if not _is_cycle(members):
@@ -55,7 +55,7 @@ def check_recursion(model: Model, diagnostics: Diagnostics) -> None:
             else:
                 check_scaling(_ways_back(members, component, seed), seed, diagnostics)
         else:
-            _check_cycle(members, component, model, diagnostics)
+            _check_cycle(members, component, writes, diagnostics)
 
 
 def _report_endless(symbol: Symbol, members: list[Symbol], diagnostics: Diagnostics) -> None:
@@ -106,10 +106,10 @@ def _ends(production: Production, ending: set[str], seed: float) -> bool:
 
 
 def _check_cycle(
-    members: list[Symbol], component: frozenset[str], model: Model, diagnostics: Diagnostics
+    members: list[Symbol], component: frozenset[str], writes: Writes, diagnostics: Diagnostics
 ) -> None:
     """A cycle that can be left: does something change on the way round that its guards look at?"""
-    seed = seed_of(model)
+    seed = writes.seed
     back = _ways_back(members, component, seed)
     if not back:
         return  # all ways round are flattened to nothing
@@ -145,7 +145,7 @@ def _check_cycle(
         )
         check_scaling(back, seed, diagnostics)
     elif not _check_direction(back, diagnostics):
-        check_termination(back, model, diagnostics)
+        check_termination(back, writes, diagnostics)
 
 
 def _ways_back(members: list[Symbol], component: frozenset[str], seed: float) -> list[Back]:

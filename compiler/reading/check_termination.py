@@ -17,7 +17,7 @@ from .check_scaling import Back, linear_map
 from .diagnostics import Diagnostics
 from .linear import NOTHING, Form, after, difference, form
 from .model import Apply, Assign, Calculate, Constant, Enter, Expression, Model, Read, Symbol
-from .walk import Way, all_ways, components, draws, seed_of
+from .walk import Way, components, draws, operators_of, seed_of
 
 # Rounds of a counter that are tried out to see whether it meets a value.
 MAX_ROUNDS = 100_000
@@ -38,10 +38,10 @@ class Need(NamedTuple):
     test: Expression
 
 
-def check_termination(back: list[Back], model: Model, diagnostics: Diagnostics) -> None:
-    """Report on the ways ``back`` of one recursion, of which none is unguarded."""
+def check_termination(back: list[Back], writes: Writes, diagnostics: Diagnostics) -> None:
+    """Report on the ways ``back`` of one recursion, of which none is unguarded. ``writes`` are the scene's."""
     edges = [each for each in back if not _draws(each[1])]
-    starts = _Starts(model, back)
+    starts = _Starts(writes, back)
     while edges:
         removed = next((found for found in map(lambda e: _removable(e, edges, starts), edges) if found), None)
         if removed is None:
@@ -182,33 +182,32 @@ def _meets(start: float, step: float, bound: float) -> bool | None:
     return None
 
 
+class Writes:
+    """What the scene's Calculations give to each parameter: (the operation's id, the constant or None)."""
+
+    def __init__(self, model: Model) -> None:
+        self.seed = seed_of(model)
+        self.of: dict[str, list[tuple[int, float | None]]] = {}
+        for operator in operators_of(model):
+            if isinstance(operator, Calculate):
+                for statement in operator.statements:
+                    if isinstance(statement, Assign):
+                        value = form(statement.value, {})
+                        constant = None if value.factors or value.low != value.high else value.low
+                        self.of.setdefault(statement.parameter, []).append((id(operator), constant))
+
+
 class _Starts:
     """The constants that parameters have where a recursion is entered."""
 
-    def __init__(self, model: Model, back: list[Back]) -> None:
-        self.seed = seed_of(model)
-        self.values: dict[str, list[float] | None] = {}
-        inside = {id(operator) for _, way in back for operator in way.operators}
-        seen: set[int] = set()
-        for way in all_ways(model):
-            for operator in way.operators:
-                if isinstance(operator, Calculate) and id(operator) not in inside | seen:
-                    seen.add(id(operator))
-                    self._take(operator)
-
-    def _take(self, operator: Calculate) -> None:
-        for statement in operator.statements:
-            if not isinstance(statement, Assign):
-                continue
-            value = form(statement.value, {})
-            known = self.values.setdefault(statement.parameter, [])
-            if value.factors or value.low != value.high:
-                self.values[statement.parameter] = None
-            elif known is not None:
-                known.append(value.low)
+    def __init__(self, writes: Writes, back: list[Back]) -> None:
+        self.seed, self._writes = writes.seed, writes
+        self._inside = {id(operator) for _, way in back for operator in way.operators}
 
     def of(self, name: str) -> list[float] | None:
-        return self.values.get(name)
+        values = [value for operator, value in self._writes.of.get(name, ()) if operator not in self._inside]
+        constants = [value for value in values if value is not None]
+        return constants if values and len(constants) == len(values) else None
 
 
 def cyclic(edges: list[Back]) -> list[Back]:
