@@ -1,8 +1,9 @@
-"""Pictures on disk, through OpenImageIO: pixels in, an image file out.
+"""Pictures on disk: pixels in, an image file out.
 
 Formats that hold floats (exr, hdr, pfm, tif) get linear floats, others (png, jpg, …) 8-bit sRGB; ``linear16`` gives
-16-bit linear values, for comparison with other renderers. OpenImageIO is imported when something is written, NumPy only for
-arrays: each costs more than drawing a small scene.
+16-bit linear values, for comparison with other renderers. OpenImageIO writes all of them but the ordinary .png: it takes
+36 MB, more than the whole of a process that draws a small scene, and Pillow 9 MB. Either is imported when something is
+written, and NumPy for arrays only.
 
 Example::
 
@@ -72,11 +73,14 @@ def write_pixels(
     ``channel`` has, to ``path``.
 
     Raises PlsysError when the format is unknown or the file can't be written; then no file is left."""
+    path = Path(path)
+    height, width, _ = memoryview(pixels).shape
+    if channel == "srgb" and path.suffix.lower() == ".png":
+        _write_png(path, pixels, width, height, metadata or {})
+        return
     import OpenImageIO as oiio
 
-    path = Path(path)
     kind, space = STORED[channel]
-    height, width, _ = memoryview(pixels).shape
     spec = oiio.ImageSpec(width, height, len(channels), kind)
     spec.channelnames = channels
     spec.attribute("oiio:ColorSpace", space)
@@ -90,6 +94,21 @@ def write_pixels(
             raise PlsysError(f"don't know the picture format '{path.suffix}'", str(path))
         if not (output.open(str(temporary), spec) and output.write_image(pixels) and output.close()):
             raise PlsysError(f"can't be written: {output.geterror().strip()}", str(path))
+
+
+def _write_png(path: Path, pixels: memoryview | np.ndarray, width: int, height: int, metadata: dict[str, str]) -> None:
+    """8-bit sRGB. The metadata become texts, under PNG's own names where it has one, as OpenImageIO writes them."""
+    from PIL import Image, PngImagePlugin
+
+    texts = PngImagePlugin.PngInfo()
+    texts.add(b"sRGB", bytes([0]))
+    for name, value in metadata.items():
+        # Plain texts are Latin-1, which not all readers know; international ones are UTF-8.
+        add = texts.add_text if value.isascii() else texts.add_itxt
+        add({"ImageDescription": "Description"}.get(name, name), value)
+    picture = Image.frombuffer("RGB", (width, height), memoryview(pixels).cast("B"), "raw", "RGB", 0, 1)
+    with written_whole(path) as temporary:
+        picture.save(temporary, "PNG", pnginfo=texts, compress_level=PNG_COMPRESSION)
 
 
 def check_format(path: str | Path) -> None:
