@@ -6,18 +6,19 @@
 
 #include "front.h"
 
-/* An instance of a front on the way from the root, with the ray in its frame. The ray comes down by composed matrices,
+/* An instance of a front on the way from the root, with the ray in its unit frame. The ray comes down by composed matrices,
  * which filter only; `error` bounds how far its points lie from those of the normative ray, which is mapped down the
  * path one transformation after another when a candidate needs it. */
 typedef struct pl_frame {
+    double o[4], d[4]; /* at t0; the fourth numbers mean nothing */
+    double t0, rate;   /* local t: (t - t0) * rate */
     const pl_front *front;
-    double o[4], d[4], error; /* the fourth numbers mean nothing */
-    double distance; /* no less than |o| */
-    double t0, rate; /* local t: (t - t0) * rate, where the box begins at 0 and the front's size is about 1 */
-    float origin[4], direction[4], inverse[4]; /* in the unit frame, at t0 */
-    float slack;     /* no hit lies farther outside its item, in the unit frame */
+    float error, distance; /* distance: no less than the ray's whole origin has */
+    float slack;           /* no hit lies farther outside its item */
+    bool blind;            /* the ray can't be told in single precision: it meets everything */
+    bool mapped;           /* normative_… are known */
     uint32_t instance;
-    bool mapped;     /* normative_… are known */
+    float origin[4], direction[4], inverse[4];
     double normative_o[3], normative_d[3];
 } pl_frame;
 

@@ -101,27 +101,6 @@ static bool plan(const pl_scene *scene, const pl_compositions *compositions, uin
 
 /* --- one front --- */
 
-/* The unit frame: the box of the bounded items centred and scaled to [-1, 1]. */
-static void set_frame(pl_front *front, const pl_state *state)
-{
-    double half = 0.0;
-    front->box = state->box;
-    front->reach = state->reach;
-    memset(front->centre, 0, sizeof front->centre);
-    front->scale = front->size = 1.0;
-    front->framed = false;
-    if (pl_box_is_empty(&state->box) || !pl_box_is_finite(&state->box)) return;
-    front->framed = true;
-    for (int axis = 0; axis < 3; axis++) {
-        front->centre[axis] = 0.5 * state->box.lo[axis] + 0.5 * state->box.hi[axis];
-        half = fmax(half, 0.5 * state->box.hi[axis] - 0.5 * state->box.lo[axis]);
-    }
-    if (half > 0.0) front->scale = fmin(1.0 / half, 1e300);
-    front->size = 1.0 / front->scale;
-    for (int axis = 0; axis < 3; axis++)
-        front->half[axis] = (float)((0.5 * state->box.hi[axis] - 0.5 * state->box.lo[axis]) * front->scale);
-}
-
 static void *copy(const void *data, size_t bytes, size_t *total)
 {
     size_t rounded = (bytes + 64) & ~(size_t)63;
@@ -180,7 +159,7 @@ bool pl_front_make(const pl_scene *scene, const pl_compositions *compositions, u
 {
     pl_front_items items = {0};
     *front = (pl_front){.state = state};
-    set_frame(front, &scene->states.list[state]);
+    pl_front_set_frame(front, &scene->states, state);
     bool ok = pl_front_open(compositions, front, most, &items, error);
     if (ok && (items.primitive_count > PL_REF_INDEX || items.instance_count > PL_REF_INDEX))
         ok = pl_fail(error, PL_ERROR_LIMIT, "memory", "a front of more than %d items", PL_REF_INDEX);

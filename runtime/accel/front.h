@@ -50,20 +50,23 @@ typedef struct pl_opened {
 } pl_opened;
 
 typedef struct pl_front_primitive {
-    float to_object[12]; /* unit frame -> shape */
-    float stretch;       /* no less than its largest singular value */
+    float columns[3 * 4]; /* unit frame -> shape, column by column; one more number is read with the last */
+    float stretch;        /* no less than its largest singular value */
     float argument;
     uint32_t opened;     /* where it stands … */
     uint32_t item;       /* … and which item of that state; | PL_NO_SHADOW */
 } pl_front_primitive;
 
+/* How far rays' origins can lie from that of the normative ray (error), and what bounds their distance from the frame's
+ * origin (distance), both in the unit frame, go down a path together:
+ *
+ *     error' = stretch * error + gain * distance + base        distance' = stretch * distance + offset */
 typedef struct pl_front_instance {
-    double columns[3 * 4 + 1]; /* composed map of points, front's state -> instance's state, column by column; one more
-                                  number is read with the last */
-    float stretch;          /* of the error of a ray, through the chain of to_objects … */
-    float gain, base;       /* … and what the chain adds, in ulps: gain * |point| + base */
+    double columns[3 * 4]; /* composed map of points, front's unit frame -> instance's, column by column; what follows is
+                              read with the last */
+    float stretch, gain, base, offset;
     uint32_t front, opened;
-    uint32_t item;          /* | PL_NO_SHADOW */
+    uint32_t item; /* | PL_NO_SHADOW */
 } pl_front_instance;
 
 typedef struct pl_front {
@@ -77,8 +80,8 @@ typedef struct pl_front {
     uint32_t state;
     bool framed;             /* its box is finite; else all items are unbounded */
     double centre[4], scale; /* unit frame: (p - centre) * scale */
-    double size;             /* 1 / scale */
     float half[4];           /* of the box in the unit frame */
+    float slack_gain, slack_base; /* no normative hit lies farther outside its box, there, than gain * distance + base */
     pl_box box;              /* of the bounded items, in the state's frame */
     pl_reach reach;
 } pl_front;
@@ -141,6 +144,10 @@ typedef struct pl_state_list {
 } pl_state_list;
 bool pl_front_count(const pl_compositions *compositions, uint32_t state, uint64_t most, pl_front_counts *counts,
                     pl_state_list *closed, pl_error *error);
+
+/* Sets what of a front follows from its state's box and reach: the unit frame, in which the box of the bounded items is centred
+ * and scaled to [-1, 1], and the slack. */
+void pl_front_set_frame(pl_front *front, const pl_states *states, uint32_t state);
 
 /* --- front_tree.c --- */
 

@@ -180,6 +180,42 @@ static float round_up(double x)
     return (double)f < x ? nextafterf(f, INFINITY) : f;
 }
 
+/* A bound, and what its rounding to single precision and that of sums with it lose. */
+static float bound(double x)
+{
+    return round_up(x * (1.0 + 0x1p-20));
+}
+
+static double length(const double v[3])
+{
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* Slack: reach.h's (twice: boxes here are composed too), and moving a ray along itself to a front's box. */
+void pl_front_set_frame(pl_front *front, const pl_states *states, uint32_t state)
+{
+    const pl_box *box = &states->list[state].box;
+    double half = 0.0;
+    front->state = state;
+    front->box = *box;
+    front->reach = states->list[state].reach;
+    memset(front->centre, 0, sizeof front->centre);
+    front->scale = 1.0;
+    front->framed = !pl_box_is_empty(box) && pl_box_is_finite(box);
+    for (int axis = 0; front->framed && axis < 3; axis++) {
+        front->centre[axis] = 0.5 * box->lo[axis] + 0.5 * box->hi[axis];
+        half = fmax(half, 0.5 * box->hi[axis] - 0.5 * box->lo[axis]);
+    }
+    if (half > 0.0) front->scale = fmin(1.0 / half, 1e300);
+    for (int axis = 0; front->framed && axis < 3; axis++)
+        front->half[axis] = (float)((0.5 * box->hi[axis] - 0.5 * box->lo[axis]) * front->scale);
+    const pl_reach *reach = &front->reach;
+    double away = length(front->centre);
+    front->slack_gain = bound(DBL_EPSILON * (2.0 * reach->gain + 16.0));
+    front->slack_base = bound(DBL_EPSILON * front->scale *
+                              (2.0 * (reach->gain * away + reach->base) + 16.0 * (away + reach->size)));
+}
+
 /* Lists an item under its box in the front's own frame, or as unbounded. Empty boxes hold nothing to hit. */
 static bool list_item(opening *o, const pl_box *box, bool unbounded, pl_ref ref)
 {
@@ -218,10 +254,10 @@ static bool add_primitive(opening *o, const chain *at, const pl_item *item, uint
         for (int c = 0; c < 3; c++) {
             double x = m[4 * r + c] / o->front->scale;
             square += x * x;
-            p->to_object[4 * r + c] = (float)x;
+            p->columns[3 * c + r] = (float)x;
         }
-        p->to_object[4 * r + 3] = (float)(m[4 * r] * centre[0] + m[4 * r + 1] * centre[1] + m[4 * r + 2] * centre[2] +
-                                          m[4 * r + 3]);
+        p->columns[9 + r] =
+            (float)(m[4 * r] * centre[0] + m[4 * r + 1] * centre[1] + m[4 * r + 2] * centre[2] + m[4 * r + 3]);
     }
     p->stretch = round_up(sqrt(square) * (1.0 + 0x1p-20));
     p->argument = (float)item->arguments[0];
@@ -235,6 +271,27 @@ static bool add_primitive(opening *o, const chain *at, const pl_item *item, uint
     return list_item(o, &box, !mesh && !shape->support, pl_ref_of(kind, (uint32_t)items->primitive_count++));
 }
 
+/* The map from a front's unit frame to that of an instance in it, and its bounds (front.h). Beyond what chain bounds: the
+ * rounding of what is composed here, for points within a few units. */
+static void set_instance_map(pl_front_instance *it, const pl_front *outer, const pl_front *inner, const chain *at)
+{
+    const double *m = at->to_object.m, size = 1.0 / outer->scale, zoom = inner->scale * size;
+    double away = length(outer->centre);
+    double stretch = at->stretch * zoom;
+    double offset = inner->scale * (at->stretch * away + at->offset + length(inner->centre));
+    double base = inner->scale * (at->gain * (2.0 * away + outer->reach.size) + at->base);
+    it->stretch = bound(stretch);
+    it->offset = bound(offset);
+    it->gain = bound(DBL_EPSILON * (2.0 * at->gain * zoom + ROUNDINGS * stretch));
+    it->base = bound(DBL_EPSILON * (base + ROUNDINGS * (offset + 4.0 * stretch)));
+    for (int r = 0; r < 3; r++) {
+        for (int c = 0; c < 3; c++) it->columns[3 * c + r] = m[4 * r + c] * zoom;
+        double centre[3];
+        pl_affine_point(&at->to_object, outer->centre, centre);
+        it->columns[9 + r] = (centre[r] - inner->centre[r]) * inner->scale;
+    }
+}
+
 static bool add_instance(opening *o, const closed *c)
 {
     pl_front_items *items = o->items;
@@ -243,17 +300,15 @@ static bool add_instance(opening *o, const closed *c)
     if (!grow(&items->instances, items->instance_count, &items->instance_capacity, sizeof *items->instances))
         return false;
     const pl_item *by = items->opened[c->opened].item;
-    items->instances[items->instance_count] = (pl_front_instance){
-        .stretch = round_up(c->at.stretch * (1.0 + 0x1p-20)),
-        .gain = round_up(c->at.gain),
-        .base = round_up(c->at.base),
+    pl_front_instance *it = &items->instances[items->instance_count];
+    pl_front inner = {0};
+    *it = (pl_front_instance){
         .front = c->item->what,
         .opened = c->opened,
         .item = (uint32_t)(c->item - states->list[by ? by->what : o->front->state].items) | (c->no_shadow ? PL_NO_SHADOW : 0),
     };
-    for (int r = 0; r < 3; r++)
-        for (int column = 0; column < 4; column++)
-            items->instances[items->instance_count].columns[3 * column + r] = c->at.to_object.m[4 * r + column];
+    pl_front_set_frame(&inner, states, it->front);
+    set_instance_map(it, o->front, &inner, &c->at);
     /* Where there are cut-offs the whole box may be drawn (cut.h). */
     pl_box box = states->cuts ? pl_box_map(&c->at.to_parent, &state->box) : pl_box_under(states, c->item, &c->at.to_parent);
     return list_item(o, &box, state->unbounded, pl_ref_of(PL_KIND_INSTANCE, (uint32_t)items->instance_count++));

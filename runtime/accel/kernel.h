@@ -1,9 +1,9 @@
 /* kernel.h - the traversal of fronts, compiled once for each instruction set by a kernel_*.c that defines the eight-wide
- * operations (wide, wide_load, wide_set, …) and KERNEL, the name of the function.
+ * operations (wide, wide_load, wide_order, …) and KERNEL, the name of the function.
  *
- * Single ray, nearest child first. The stack holds 64-bit entries, the local t of entry in the high half, so that they
- * sort as integers; an instance pushes a PL_KIND_RETURN entry below its own. All that is computed here in single
- * precision filters only (front.h), so instruction sets can't show in hits. */
+ * Single ray, nearest child first. The stack holds 64-bit entries, the local t of entry in the high half (but for its last
+ * three bits), so that they sort as integers; an instance pushes a PL_KIND_RETURN entry below its own. All that is
+ * computed here in single precision filters only (front.h), so instruction sets can't show in hits. */
 #include "bvh.h"
 
 #include <string.h>
@@ -17,12 +17,12 @@ static inline uint64_t entry_of(float t, pl_ref ref)
     return (uint64_t)bits << 32 | ref;
 }
 
-static inline float entry_t(uint64_t entry)
+/* Whether an entry lies beyond t_max: numbers that aren't negative compare like their bits. */
+static inline bool entry_is_beyond(uint64_t entry, float t_max)
 {
-    uint32_t bits = (uint32_t)(entry >> 32);
-    float t;
-    memcpy(&t, &bits, sizeof t);
-    return t;
+    uint32_t bits;
+    memcpy(&bits, &t_max, sizeof bits);
+    return ((uint32_t)(entry >> 32) & ~(uint32_t)(PL_FRONT_WIDTH - 1)) > bits;
 }
 
 /* [enter, leave], the ray's interval in the shape widened by the margin. Every constraint narrows it by itself, and each
@@ -102,17 +102,21 @@ static inline bool shape_interval(uint32_t kind, float argument, const float o[3
     }
 }
 
+/* Four numbers at once: a vector and one that means nothing. */
+typedef double double4 __attribute__((vector_size(32), aligned(8), may_alias));
+typedef float float4 __attribute__((vector_size(16), aligned(4), may_alias));
+typedef int32_t int4 __attribute__((vector_size(16)));
+
 /* Whether a primitive can have a root in (0, t_max) of the frame; with `any`, also whether it must. */
 static inline enum kernel_verdict filter(const pl_front_primitive *p, uint32_t kind, const pl_frame *f, float t_max,
                                          bool any)
 {
-    float o[3], d[3];
     if (kind == PL_KIND_MESH || kind == PL_SHAPE_PLANE) return CANDIDATE;
-    for (int r = 0; r < 3; r++) {
-        const float *m = p->to_object + 4 * r;
-        o[r] = m[0] * f->origin[0] + m[1] * f->origin[1] + m[2] * f->origin[2] + m[3];
-        d[r] = m[0] * f->direction[0] + m[1] * f->direction[1] + m[2] * f->direction[2];
-    }
+    const float4 x = *(const float4 *)p->columns, y = *(const float4 *)(p->columns + 3);
+    const float4 z = *(const float4 *)(p->columns + 6), offset = *(const float4 *)(p->columns + 9);
+    const float4 at = x * f->origin[0] + y * f->origin[1] + (z * f->origin[2] + offset);
+    const float4 along = x * f->direction[0] + y * f->direction[1] + z * f->direction[2];
+    const float o[3] = {at[0], at[1], at[2]}, d[3] = {along[0], along[1], along[2]};
     float margin = p->stretch * f->slack + 0x1p-19f;
     interval i = {-1e30f, 1e30f};
     if (!shape_interval(kind, p->argument, o, d, margin, &i)) return MISS;
@@ -126,25 +130,26 @@ static inline enum kernel_verdict filter(const pl_front_primitive *p, uint32_t k
 
 /* --- entering an instance --- */
 
-/* Four numbers at once: a vector and one that means nothing. */
-typedef double double4 __attribute__((vector_size(32), aligned(8), may_alias));
-typedef float float4 __attribute__((vector_size(16), aligned(4), may_alias));
-typedef int64_t long4 __attribute__((vector_size(32)));
-typedef int32_t int4 __attribute__((vector_size(16)));
-
-static inline double4 absolute(double4 x)
-{
-    return (double4)((long4)x & INT64_MAX);
-}
-
-static inline float4 absolute_float(float4 x)
+static inline float4 absolute(float4 x)
 {
     return (float4)((int4)x & INT32_MAX);
 }
 
-static inline double larger(double a, double b)
+static inline float sum_of(float4 x)
 {
-    return a > b ? a : b;
+    return x[0] + x[1] + x[2];
+}
+
+static inline float least_of(float4 x)
+{
+    float least = x[0] < x[1] ? x[0] : x[1];
+    return x[2] < least ? x[2] : least;
+}
+
+static inline float greatest_of(float4 x)
+{
+    float greatest = x[0] > x[1] ? x[0] : x[1];
+    return x[2] > greatest ? x[2] : greatest;
 }
 
 /* The power of two that brings x into [1, 2), where it and its inverse are normal numbers. */
@@ -157,11 +162,18 @@ static inline double inverse_power(double x)
     return x;
 }
 
-/* A ray that can't be told in single precision meets everything. */
-static void give_up_filtering(pl_frame *f, double t_min)
+/* t_max in the frame's own t, rounded up. */
+static inline float local_t_max(const pl_frame *f, double t_max)
 {
-    f->t0 = t_min;
-    f->rate = 0.0;
+    if (f->blind) return 1e30f;
+    double t = (t_max - f->t0) * f->rate * (1.0 + 0x1p-20);
+    return t < 1e30 ? (t > 0.0 ? (float)t + 1e-35f : 1e-35f) : 1e30f;
+}
+
+/* A ray that can't be told in single precision meets everything. */
+static void go_blind(pl_frame *f)
+{
+    f->blind = true;
     f->slack = 1e30f;
     for (int axis = 0; axis < 3; axis++) {
         f->origin[axis] = f->direction[axis] = 0.0f;
@@ -169,142 +181,168 @@ static void give_up_filtering(pl_frame *f, double t_min)
     }
 }
 
-/* Begins a frame with the ray of f->o and f->d; false if it misses the box. f->t0 becomes where the box begins, roughly:
- * no hit lies before it, and from there on all numbers are about 1, which single precision can tell apart.
- *
- * In the unit frame a hit lies outside its exact box by no more than `slack`: the rounding of the chain below (reach.h,
- * twice: boxes here are composed too), of the ray above (error), of moving to t0; and of single precision, where
- * 2^-19 is some 30 roundings. A direction that hardly moves along an axis still gets an inverse: within the front it moves
- * by less than the slack either way. */
-static inline __attribute__((always_inline)) bool begin_frame(pl_frame *f, double4 o, double4 d, double t_min, double t_max)
+/* Where the ray o + t·d is within a frame's box widened by the slack. A direction that hardly moves along an axis still gets
+ * an inverse: within the front it moves by less than the slack either way. */
+typedef struct span {
+    float4 along, inverse;
+    float enter, leave;
+} span;
+
+static inline span box_span(const pl_front *front, float4 o, float4 d, float slack)
 {
-    const pl_front *front = f->front;
-    double4 d_size = absolute(d), o_size = absolute(o);
-    double largest = larger(d_size[0], larger(d_size[1], d_size[2]));
-    double shrink = inverse_power(largest);
+    const int4 sign = (int4)d & INT32_MIN;
+    const float4 size = absolute(d), least = {1e-18f, 1e-18f, 1e-18f, 1e-18f};
+    const int4 moves = size > least;
+    span s;
+    s.along = (float4)((((int4)size & moves) | ((int4)least & ~moves)) | sign);
+    s.inverse = 1.0f / s.along;
+    const float4 middle = o * s.inverse, reach = (*(const float4 *)front->half + slack) * absolute(s.inverse);
+    s.enter = greatest_of(-middle - reach);
+    s.enter = s.enter > 0.0f ? s.enter : 0.0f;
+    s.leave = least_of(reach - middle);
+    return s;
+}
+
+/* How far a ray may be from the box and still be told in single precision, and what its direction's length may be. */
+#define FAR 64.0f
+#define SLOW 0x1p-20f
+#define FAST 0x1p20f
+
+static inline float slack_of(const pl_frame *f, float far)
+{
+    return f->error + f->front->slack_gain * f->distance + f->front->slack_base + 0x1p-19f * (1.0f + far);
+}
+
+enum settled { BLIND, MISSES, SETTLED };
+
+/* Brings the ray to where the box begins, and its direction to about unit length by a power of two. */
+static __attribute__((noinline)) enum settled settle(pl_frame *f, double t_max)
+{
+    double largest = 0.0, far = 0.0;
+    for (int axis = 0; axis < 3; axis++) {
+        double size = __builtin_fabs(f->d[axis]);
+        largest = size > largest ? size : largest;
+        far += __builtin_fabs(f->o[axis]);
+    }
+    const double shrink = inverse_power(largest), rate = f->rate * inverse_power(shrink);
+    if (!(far < 1e12 && rate > 1e-200 && rate < 1e200)) return BLIND;
+    const float slack = slack_of(f, (float)far);
+    if (!(slack < 1e6f)) return BLIND;
+    float4 o = {0}, d = {0};
+    for (int axis = 0; axis < 3; axis++) {
+        f->d[axis] *= shrink;
+        o[axis] = (float)f->o[axis];
+        d[axis] = (float)f->d[axis];
+    }
+    f->rate = rate;
+    const span s = box_span(f->front, o, d, slack);
+    if (s.enter > s.leave || s.enter > local_t_max(f, t_max)) return MISSES;
+    f->t0 += (double)s.enter / rate;
+    for (int axis = 0; axis < 3; axis++) f->o[axis] += (double)s.enter * f->d[axis];
+    f->error += 0x1p-49f * (f->distance + (float)far);
+    return SETTLED;
+}
+
+/* Begins a frame with the ray of f->o and f->d; false if it misses the box.
+ *
+ * In the unit frame a hit lies outside its exact box by no more than `slack`: the rounding of the chain below (front.h),
+ * of the ray above (error), and of single precision, where 2^-19 is some 30 roundings. */
+static inline __attribute__((always_inline)) bool begin_frame(pl_frame *f, double4 o, double4 d, double t_max,
+                                                              float *local_max)
+{
+    float4 at = __builtin_convertvector(o, float4), along = __builtin_convertvector(d, float4);
+    float far = sum_of(absolute(at)), size = sum_of(absolute(along));
     *(double4 *)f->o = o;
     *(double4 *)f->d = d;
-    f->mapped = false;
-    f->distance = o_size[0] + o_size[1] + o_size[2];
-    double slack = f->error + DBL_EPSILON * (2.0 * (front->reach.gain * f->distance + front->reach.base) +
-                                             16.0 * (f->distance + front->reach.size));
-    slack *= 1.001 * front->scale;
-    f->rate = front->scale * inverse_power(shrink);
-    double4 origin = (o + t_min * d - *(const double4 *)front->centre) * front->scale, direction = d * shrink;
-    double4 far = absolute(origin);
-    double wide_slack = slack + 0x1p-19 * (1.0 + far[0] + far[1] + far[2]);
-    if (front->root == PL_NOTHING || !(f->rate > 1e-200 && f->rate < 1e200 && wide_slack < 1e6)) {
-        give_up_filtering(f, t_min);
-        return front->root != PL_NOTHING;
+    f->mapped = f->blind = false;
+    if (__builtin_expect(!(far <= FAR && size >= SLOW && size <= FAST), 0)) {
+        enum settled result = settle(f, t_max);
+        if (result != SETTLED) {
+            go_blind(f);
+            *local_max = 1e30f;
+            return result == BLIND && f->front->root != PL_NOTHING;
+        }
+        at = __builtin_convertvector(*(const double4 *)f->o, float4);
+        along = __builtin_convertvector(*(const double4 *)f->d, float4);
+        far = sum_of(absolute(at));
+        *local_max = local_t_max(f, t_max);
     }
-    float4 along = __builtin_convertvector(direction, float4), at = __builtin_convertvector(origin, float4);
-    int4 still = absolute_float(along) <= 1e-18f;
-    along = (float4)((still & (int4)(float4){1e-18f, 1e-18f, 1e-18f, 1e-18f}) | (~still & (int4)along) |
-                     ((int4)along & INT32_MIN));
-    float4 inverse = 1.0f / along, middle = -at * inverse;
-    float4 reach = (*(const float4 *)front->half + (float)wide_slack) * absolute_float(inverse);
-    float4 near_t = middle - reach, far_t = middle + reach;
-    float enter = near_t[0] > near_t[1] ? near_t[0] : near_t[1], leave = far_t[0] < far_t[1] ? far_t[0] : far_t[1];
-    enter = near_t[2] > enter ? near_t[2] : enter;
-    leave = far_t[2] < leave ? far_t[2] : leave;
-    enter = enter > 0.0f ? enter : 0.0f;
-    f->t0 = t_min + (double)enter * shrink * front->size;
-    if (enter > leave || f->t0 > t_max) {
-        give_up_filtering(f, t_min);
-        return false;
-    }
-    origin += (double)enter * direction;
-    far = absolute(origin);
-    *(float4 *)f->origin = __builtin_convertvector(origin, float4);
-    *(float4 *)f->direction = along;
-    *(float4 *)f->inverse = inverse;
-    f->slack = (float)(slack + 0x1p-19 * (1.0 + far[0] + far[1] + far[2]));
-    return true;
+    f->slack = slack_of(f, far);
+    const span s = box_span(f->front, at, along, f->slack);
+    *(float4 *)f->origin = at;
+    *(float4 *)f->direction = s.along;
+    *(float4 *)f->inverse = s.inverse;
+    const bool told = f->slack < 1e6f;
+    if (told && s.enter <= s.leave && s.enter <= *local_max && f->front->root != PL_NOTHING) return true;
+    go_blind(f);
+    *local_max = 1e30f;
+    return !told && f->front->root != PL_NOTHING;
 }
 
 /* Goes into an instance: frame `index` + 1. 0: it misses, 1: it meets the box, 2: only what is unbounded, -1: an error. */
-static inline int descend(pl_tracer *tracer, uint32_t index, uint32_t instance, pl_query *query)
+static inline int descend(pl_tracer *tracer, uint32_t index, uint32_t instance, const pl_query *query, float *local_max)
 {
     pl_bvh_work *w = tracer->work;
     const pl_fronts *fronts = tracer->scene->structure;
     if (index + 1 >= w->frame_capacity && !pl_bvh_grow_frames(w, index + 1, query->error)) return -1;
     const pl_frame *parent = &w->frames[index];
-    const pl_front *front = parent->front;
-    const pl_front_instance *it = &front->instances[instance];
+    const pl_front_instance *it = &parent->front->instances[instance];
     if (query->shadow && it->item & PL_NO_SHADOW) return 0;
     pl_frame *f = &w->frames[index + 1];
     f->front = &fronts->list[it->front];
     f->instance = instance;
-    f->error = (double)it->stretch * parent->error +
-               DBL_EPSILON * ((double)it->gain * (2.0 * parent->distance + front->reach.size) + (double)it->base);
+    f->error = it->stretch * parent->error + (it->gain * parent->distance + it->base);
+    f->distance = it->stretch * parent->distance + it->offset;
+    f->t0 = parent->t0;
+    f->rate = parent->rate;
+    if (parent->blind) *local_max = local_t_max(f, query->t_max);
     /* The fourth number of each is the next column's first, and nobody looks at what becomes of it. */
     const double4 x = *(const double4 *)it->columns, y = *(const double4 *)(it->columns + 3);
     const double4 z = *(const double4 *)(it->columns + 6), offset = *(const double4 *)(it->columns + 9);
-    double4 o = x * parent->o[0] + y * parent->o[1] + z * parent->o[2] + offset;
-    double4 d = x * parent->d[0] + y * parent->d[1] + z * parent->d[2];
+    const double4 o = four_fma(x, parent->o[0], four_fma(y, parent->o[1], four_fma(z, parent->o[2], offset)));
+    const double4 d = four_fma(x, parent->d[0], four_fma(y, parent->d[1], z * parent->d[2]));
     tracer->counters.instances++;
-    if (begin_frame(f, o, d, query->t_min, query->t_max)) return 1;
+    if (begin_frame(f, o, d, query->t_max, local_max)) return 1;
     return f->front->unbounded_count ? 2 : 0;
 }
 
 /* --- the loop --- */
 
-/* What the loop keeps at hand of the frame it is in. */
+/* What the loop keeps at hand of the frame it is in. base: (origin moved by the slack) / direction. */
 typedef struct near {
-    wide near_origin[3], far_origin[3], inverse[3];
+    wide near_base[3], far_base[3], inverse[3];
     uint32_t near_row[3], far_row[3]; /* offsets of planes, in floats */
     float t_max;
 } near;
 
-/* t_max in the frame's own t, rounded up. */
-static inline float local_t_max(const pl_frame *f, double t_max)
-{
-    if (f->rate == 0.0) return 1e30f;
-    double t = (t_max - f->t0) * f->rate * (1.0 + 0x1p-20);
-    return t < 1e30 ? (t > 0.0 ? (float)t + 1e-35f : 1e-35f) : 1e30f;
-}
-
-static inline void look(near *n, const pl_frame *f, double t_max)
+static inline void look(near *n, const pl_frame *f)
 {
 #pragma GCC unroll 3
     for (int axis = 0; axis < 3; axis++) {
         bool negative = f->direction[axis] < 0.0f;
-        float toward = negative ? -f->slack : f->slack;
-        n->near_origin[axis] = wide_set(f->origin[axis] + toward);
-        n->far_origin[axis] = wide_set(f->origin[axis] - toward);
+        float toward = f->slack * __builtin_fabsf(f->inverse[axis]), middle = f->origin[axis] * f->inverse[axis];
+        n->near_base[axis] = wide_set(middle + toward);
+        n->far_base[axis] = wide_set(middle - toward);
         n->inverse[axis] = wide_set(f->inverse[axis]);
         n->near_row[axis] = (uint32_t)(negative ? 3 + axis : axis) * PL_FRONT_WIDTH;
         n->far_row[axis] = (uint32_t)(negative ? axis : 3 + axis) * PL_FRONT_WIDTH;
     }
-    n->t_max = local_t_max(f, t_max);
 }
 
-/* Writes the children of a node that the ray meets, in no order; returns their number. */
-static inline unsigned meet(const near *n, const pl_front_node *node, uint64_t *entries)
+/* Writes the children of a node that the ray meets, the nearest last; returns their number. */
+static inline unsigned meet(const near *n, const pl_front_node *node, uint64_t *entries, pl_ref *nearest)
 {
-    wide enter = wide_set(0.0f), leave = wide_set(n->t_max);
     wide near_t[3], far_t[3];
 #pragma GCC unroll 3
     for (int axis = 0; axis < 3; axis++) {
-        wide near_plane = wide_load(node->planes[0] + n->near_row[axis]);
-        wide far_plane = wide_load(node->planes[0] + n->far_row[axis]);
-        near_t[axis] = wide_multiply(wide_subtract(near_plane, n->near_origin[axis]), n->inverse[axis]);
-        far_t[axis] = wide_multiply(wide_subtract(far_plane, n->far_origin[axis]), n->inverse[axis]);
+        near_t[axis] = wide_multiply_subtract(wide_load(node->planes[0] + n->near_row[axis]), n->inverse[axis],
+                                              n->near_base[axis]);
+        far_t[axis] = wide_multiply_subtract(wide_load(node->planes[0] + n->far_row[axis]), n->inverse[axis],
+                                             n->far_base[axis]);
     }
-    enter = wide_max(wide_max(near_t[0], near_t[1]), wide_max(near_t[2], enter));
-    leave = wide_min(wide_min(far_t[0], far_t[1]), wide_min(far_t[2], leave));
-    return wide_entries(enter, leave, node->child, entries);
-}
-
-/* The nearest last. */
-static inline void sort_entries(uint64_t *entries, unsigned count)
-{
-    for (unsigned i = 1; i < count; i++) {
-        uint64_t entry = entries[i];
-        unsigned place = i;
-        for (; place > 0 && entries[place - 1] < entry; place--) entries[place] = entries[place - 1];
-        entries[place] = entry;
-    }
+    wide enter = wide_max(wide_max(near_t[0], near_t[1]), wide_max(near_t[2], wide_set(0.0f)));
+    wide leave = wide_min(wide_min(far_t[0], far_t[1]), wide_min(far_t[2], wide_set(n->t_max)));
+    return wide_order(enter, leave, node->child, entries, nearest);
 }
 
 /* Pushes what a frame begins with, below it the way back. */
@@ -331,25 +369,17 @@ static inline bool visit(pl_tracer *tracer, pl_query *query, bool met, bool any)
     near n;
     if (!begin(w, f->front, met, &top, query->error)) return false;
     stack = w->stack;
-    look(&n, f, query->t_max);
+    look(&n, f);
+    n.t_max = local_t_max(f, query->t_max);
     for (;;) {
         uint64_t at = stack[--top];
         pl_ref ref = (pl_ref)at;
-        if (entry_t(at) > n.t_max) continue;
+        if (entry_is_beyond(at, n.t_max)) continue;
         while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
-            const pl_front_node *node = &f->front->nodes[ref];
-            unsigned count = meet(&n, node, stack + top);
+            unsigned count = meet(&n, &f->front->nodes[ref], stack + top, &ref);
             steps++;
             if (count == 0) goto next;
-            if (count == 2) {
-                uint64_t a = stack[top], b = stack[top + 1];
-                stack[top] = a > b ? a : b;
-                stack[top + 1] = a > b ? b : a;
-            } else if (count > 2) {
-                sort_entries(stack + top, count);
-            }
             top += count - 1;
-            ref = (pl_ref)stack[top];
             if (top + 16 > w->stack_capacity) {
                 if (!pl_bvh_grow_stack(w, top, query->error)) return false;
                 stack = w->stack;
@@ -359,16 +389,19 @@ static inline bool visit(pl_tracer *tracer, pl_query *query, bool met, bool any)
         if (kind == PL_KIND_RETURN) {
             if (frame == 0) break;
             f = &w->frames[--frame];
-            look(&n, f, query->t_max);
+            look(&n, f);
+            n.t_max = local_t_max(f, query->t_max);
         } else if (kind == PL_KIND_INSTANCE) {
-            int entered = descend(tracer, frame, ref & PL_REF_INDEX, query);
+            float t_max = n.t_max;
+            int entered = descend(tracer, frame, ref & PL_REF_INDEX, query, &t_max);
             if (entered < 0) return false;
             if (entered) frame++;
             f = &w->frames[frame]; /* which may have moved */
             if (!entered) continue;
+            n.t_max = t_max;
             if (!begin(w, f->front, entered == 1, &top, query->error)) return false;
             stack = w->stack;
-            look(&n, f, query->t_max);
+            look(&n, f);
             if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
         } else {
             const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
@@ -397,12 +430,19 @@ bool KERNEL(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     pl_bvh_work *w = tracer->work;
     const pl_fronts *fronts = tracer->scene->structure;
     pl_frame *root = &w->frames[0];
-    const double4 o = {ray->origin[0], ray->origin[1], ray->origin[2]};
-    const double4 d = {ray->direction[0], ray->direction[1], ray->direction[2]};
-    root->front = &fronts->list[0];
-    root->error = 0.0;
+    const pl_front *front = &fronts->list[0];
+    const double4 origin = {ray->origin[0], ray->origin[1], ray->origin[2]};
+    const double4 direction = {ray->direction[0], ray->direction[1], ray->direction[2]};
+    const double4 from = (origin - *(const double4 *)front->centre) * front->scale, d = direction * front->scale;
+    float local_max = 1e30f;
+    root->front = front;
+    root->error = 0.0f;
+    root->distance = (float)__builtin_fabs(from[0]) + (float)__builtin_fabs(from[1]) + (float)__builtin_fabs(from[2]);
+    root->distance *= 1.0f + 0x1p-20f;
+    root->t0 = query->t_min;
+    root->rate = 1.0;
     root->instance = 0;
-    bool met = begin_frame(root, o, d, query->t_min, query->t_max);
+    bool met = begin_frame(root, from + query->t_min * d, d, query->t_max, &local_max);
     if (!met && !root->front->unbounded_count) {
         wide_end();
         return true;

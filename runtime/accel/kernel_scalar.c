@@ -9,6 +9,7 @@
 #define KERNEL pl_bvh_trace_scalar
 
 #define wide_end() ((void)0)
+#define four_fma(a, b, c) ((a) * (b) + (c))
 
 typedef struct wide {
     float at[8];
@@ -28,15 +29,9 @@ static inline wide wide_set(float x)
     return w;
 }
 
-static inline wide wide_subtract(wide a, wide b)
+static inline wide wide_multiply_subtract(wide a, wide b, wide c)
 {
-    for (int i = 0; i < 8; i++) a.at[i] -= b.at[i];
-    return a;
-}
-
-static inline wide wide_multiply(wide a, wide b)
-{
-    for (int i = 0; i < 8; i++) a.at[i] *= b.at[i];
+    for (int i = 0; i < 8; i++) a.at[i] = a.at[i] * b.at[i] - c.at[i];
     return a;
 }
 
@@ -53,16 +48,20 @@ static inline wide wide_min(wide a, wide b)
     return a;
 }
 
-/* Entries of the children whose enter <= leave; their number. */
-static inline unsigned wide_entries(wide enter, wide leave, const pl_ref *child, uint64_t *entries)
+/* Entries of the children whose enter <= leave, the nearest last; their number. */
+static inline unsigned wide_order(wide enter, wide leave, const pl_ref *child, uint64_t *entries, pl_ref *nearest)
 {
     unsigned count = 0;
     for (int i = 0; i < 8; i++) {
+        if (!(enter.at[i] <= leave.at[i])) continue;
         uint32_t bits;
         memcpy(&bits, &enter.at[i], sizeof bits);
-        entries[count] = (uint64_t)bits << 32 | child[i];
-        count += enter.at[i] <= leave.at[i];
+        uint64_t entry = (uint64_t)bits << 32 | child[i];
+        unsigned place = count++;
+        for (; place > 0 && entries[place - 1] < entry; place--) entries[place] = entries[place - 1];
+        entries[place] = entry;
     }
+    if (count) *nearest = (pl_ref)entries[count - 1];
     return count;
 }
 
