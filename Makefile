@@ -62,8 +62,8 @@ generate: ## write all generated files again
 	$(PYTHON) runtime/generate.py
 	$(PYTHON) grammar/generate.py
 
-bench: .venv/.bench ## measure plsys, Embree, POV-Ray and Mitsuba side by side (BENCH='--quick --only order20')
-	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python tests/bench/bench.py $(BENCH)
+bench: .venv/.bench ## measure plsys, Embree, POV-Ray and Mitsuba side by side (ONLY=order20,menger QUICK=1)
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python tests/bench/bench.py $(if $(ONLY),--only $(ONLY)) $(if $(QUICK),--quick) $(BENCH)
 
 bench-lsp: .venv/.tests ## measure the language server against its budgets
 	$(BIN)/python tests/bench/lsp.py

@@ -1,14 +1,9 @@
-"""The rows of the bench's table that compare plsys with Embree, POV-Ray and Mitsuba; targets stand beside the measurement."""
+"""The rows of the bench's table that compare rates of rays with Embree's and POV-Ray's; targets stand beside the measurement."""
 
 from __future__ import annotations
 
-import shutil
-import sys
-from pathlib import Path
-
-import peer_mitsuba as mitsuba
 import peers
-from common import ALL, SETS, Bench, against_embree, curves_of, median, pixels_traced, rate, same_hits
+from common import ALL, SETS, Bench, against_embree, curves_of, median, pixels_traced, rate, rays_of_a_picture, same_hits
 from peers import ours, plsys
 from prepare import (
     CURVES,
@@ -17,34 +12,10 @@ from prepare import (
     Case,
     box_quads,
     split_forest,
-    split_tree,
     triangles_of,
     write_embree,
 )
 from report import size
-
-
-def start(bench: Bench) -> None:
-    """A scene of one sphere: what a process costs by itself."""
-    text = "camera { location <0, 0, -5> look_at 0 }\nlight_source { <9, 9, -9> color rgb 1 }\nsphere { 0, 1 pigment { color rgb 1 } }\n"
-    case = Case("one sphere", "sphere", {}, bench.folder, text)
-    runs = [plsys("render", case.path, "-o", case.folder / "ours.png") for _ in range(3 * bench.rounds)]
-    bench.results.row("one sphere", "plsys render, wall", [r.wall for r in runs], 0.25, " s", at_most=True)
-    bench.results.row(
-        "one sphere", "plsys render, peak", median([r.rss for r in runs]) / 1e6, 60, " MB", at_most=True
-    )
-    tool = shutil.which("plsys-rt") or shutil.which("plsys-rt", path=str(Path(sys.executable).parent))
-    if not tool:
-        peers.MISSING["plsys-rt"] = "it isn't installed; run by `make bench`"
-        return
-    plsys("compile", case.path, "-o", case.folder / "sphere.plsb")
-    runs = [
-        peers.run([tool, case.folder / "sphere.plsb", "-o", case.folder / "o.pfm", "--size", "1x1"])
-        for _ in range(3 * bench.rounds)
-    ]
-    bench.results.row(
-        "one sphere", "plsys-rt of one pixel, wall", [1e3 * r.wall for r in runs], 10, " ms", at_most=True
-    )
 
 
 def figure(bench: Bench) -> None:
@@ -78,8 +49,8 @@ def figure(bench: Bench) -> None:
     drawn = [(pixels_traced(case), peers.povray(case, case.folder)) for _ in range(bench.rounds)]
     if drawn[0][1]:
         bench.results.row(
-            case.name, "POV-Ray's trace : ours, 640x480", [t["trace"] / o["seconds"]["trace"] for o, t in drawn], 4,
-            ours=f"{drawn[-1][0]['seconds']['trace']:.3f} s", theirs=f"{drawn[-1][1]['trace']:.3f} s",
+            case.name, "POV-Ray's trace : ours, 640x480, CPU", [t["trace"] / o["seconds"]["trace_cpu"] for o, t in drawn], 4,
+            ours=f"{drawn[-1][0]['seconds']['trace_cpu']:.3f} s", theirs=f"{drawn[-1][1]['trace']:.3f} s",
         )  # fmt: skip
 
 
@@ -109,6 +80,12 @@ def order20(bench: Bench) -> None:
             at_most=True,
         )
         same_hits(bench, case, last[1])
+    sixteen = Case("order 16", "tree", {"order": 16}, bench.folder)
+    flat = [ours(sixteen, options={"front_items": ALL}, repeats=1) for _ in range(bench.rounds)]
+    bench.results.row(
+        sixteen.name, "building, a primitive that is flattened", [1e6 * f["build_seconds"] / f["primitives"] for f in flat], 0.6, " µs",
+        at_most=True, ours=f"{flat[0]['primitives']:,} of them",
+    )  # fmt: skip
     boxes, bvh = ours(case, options={"accelerator": "boxes"}, repeats=1), ours(case)
     for name in SETS:
         bench.results.row(
@@ -129,8 +106,8 @@ def order20(bench: Bench) -> None:
             ours=f"{median([r.wall for r in whole]):.2f} s, {size(whole[0].rss)}", theirs=f"{theirs['wall']:.1f} s, {size(theirs['rss'])}",
         )  # fmt: skip
         bench.results.row(
-            case.name, "POV-Ray's trace (CPU) : ours", [theirs["trace"] / m["seconds"]["trace"] for m in mine], 10,
-            ours=f"{median([m['seconds']['trace'] for m in mine]):.2f} s", theirs=f"{theirs['trace']:.2f} s",
+            case.name, "POV-Ray's trace (CPU) : ours", [theirs["trace"] / m["seconds"]["trace_cpu"] for m in mine], 10,
+            ours=f"{median([m['seconds']['trace_cpu'] for m in mine]):.2f} s", theirs=f"{theirs['trace']:.2f} s",
         )  # fmt: skip
 
 
@@ -165,7 +142,7 @@ def menger(bench: Bench) -> None:
         against_embree(bench, case, triangles, {}, {}, "of Embree 3.13 triangles, robust", flags="r")
         against_embree(bench, case, triangles, {}, {}, "of embreex 4.4 triangles", "4.4")
     four = ours(case)
-    for level, most, proportions in ((6, 0.2, (3.6 / 8.8, 2.8 / 4.5)), (10, 0.3, (2.2 / 8.8, 1.4 / 4.5))):
+    for level, most, proportions in ((6, 0.2, (3.6 / 8.8, 2.8 / 4.5)), (10, 0.3, (None, 1.4 / 4.5))):
         deep = Case(f"Menger {level}", "menger", {"level": level}, bench.folder)
         answers = [ours(deep) for _ in range(bench.rounds)]
         if "failed" in answers[0]:
@@ -174,13 +151,18 @@ def menger(bench: Bench) -> None:
         bench.results.row(deep.name, "memory", answers[0]["scene_bytes"] / 1e6, most, " MB", at_most=True)
         for name, proportion in zip(SETS, proportions):
             bench.results.row(
-                deep.name, f"{name}: of Menger 4's rate", [rate(a, name) / rate(four, name) for a in answers], round(proportion, 2),
+                deep.name, f"{name}: of Menger 4's rate", [rate(a, name) / rate(four, name) for a in answers], proportion and round(proportion, 2),
                 ours=f"{median([rate(a, name) for a in answers]):.2f} Mray/s",
             )  # fmt: skip
+    pairs = [(pixels_traced(deep, "--detail", "1"), pixels_traced(case)) for _ in range(bench.rounds)]
+    bench.results.row(
+        deep.name, "rays of a picture at 1 px, of Menger 4's", [rays_of_a_picture(m) / rays_of_a_picture(o) for m, o in pairs], round(2.2 / 8.8, 2),
+        ours=f"{rays_of_a_picture(pairs[-1][0]):.2f} Mray/s", theirs=f"{rays_of_a_picture(pairs[-1][1]):.2f}",
+    )  # fmt: skip
 
 
 def forest(bench: Bench) -> None:
-    """10,000 trees of 32 kinds against Embree with two levels of instances; then every tree unique."""
+    """10,000 trees of 32 kinds against Embree with two levels of instances."""
     case = Case("forest", "forest", {}, bench.folder)
     groups, instances = split_forest(case)
     scene = write_embree(case.folder / "two-level.bin", [(CURVES, g) for g in groups], instances)
@@ -206,21 +188,6 @@ def forest(bench: Bench) -> None:
             at_most=True,
         )
         same_hits(bench, case, last[1])
-    unique(bench, case)
-
-
-def unique(bench: Bench, shared: Case) -> None:
-    """Every tree unique: 163,840,000 different cylinders."""
-    case = Case("unique forest", "forest", {"unique": 1}, bench.folder)
-    options = ["--detail", "1", "--memory", "200M"]
-    try:
-        mine = pixels_traced(case, *options)
-    except RuntimeError as error:
-        return bench.results.note(case.name, f"failed: {str(error).strip().splitlines()[-1][:160]}")
-    with_all = pixels_traced(shared)
-    bench.results.row(case.name, "render 640x480 at --detail 1, of the shared one's time", mine["wall"] / with_all["wall"], 4, at_most=True,
-                      ours=f"{mine['wall']:.2f} s", theirs=f"{with_all['wall']:.2f} s")  # fmt: skip
-    bench.results.row(case.name, "peak of the whole process", mine["rss"] / 1e6, 256, " MB", at_most=True)
 
 
 def fern(bench: Bench) -> None:
@@ -228,9 +195,7 @@ def fern(bench: Bench) -> None:
     case = Case("endless fern", "fern_endless", {}, bench.folder)
     sponge = Case("Menger 4", "menger", {"level": 4}, bench.folder)
     pairs = [(pixels_traced(case, "--detail", "1"), pixels_traced(sponge)) for _ in range(bench.rounds)]
-    speeds = [
-        [1e-6 * sum(side["rays"].values()) / side["seconds"]["trace"] for side in pair] for pair in pairs
-    ]
+    speeds = [[rays_of_a_picture(side) for side in pair] for pair in pairs]
     bench.results.row(
         case.name, "memory", pairs[0][0]["memory"]["scene_bytes"] / 1e3, 50, " KB", at_most=True
     )
@@ -241,66 +206,3 @@ def fern(bench: Bench) -> None:
         round(1.5 / 8.8, 2),
         ours=f"{median([mine for mine, _ in speeds]):.2f} Mray/s",
     )
-
-
-def split_by_hand(bench: Bench) -> None:
-    """Whole processes, source to picture: plsys against Mitsuba's best form."""
-    if not mitsuba.program():
-        return
-    ten = Case("order 10", "tree", {"order": 10}, bench.folder)
-    twenty = Case("order 20", "tree", {"order": 20}, bench.folder)
-    woods = Case("forest", "forest", {}, bench.folder)
-    eight, four = (Case(f"Menger {n}", "menger", {"level": n}, bench.folder) for n in (8, 4))
-    lower, upper, places = split_tree(twenty)
-    forms = [
-        (ten, lambda: ([mitsuba.Group("curves", curves_of(ten))], [])),
-        (
-            twenty,
-            lambda: (
-                [mitsuba.Group("curves", lower), mitsuba.Group("curves", upper, True)],
-                [(1, p) for p in places],
-            ),
-        ),
-        (woods, lambda: _forest_groups(woods)),
-        (eight, lambda: _menger_groups(four)),
-    ]
-    for case, form in forms:
-        if bench.quick and case is eight:
-            continue
-        scene = mitsuba.write_scene(case.folder / "mitsuba.xml", case, *form())
-        parameters = [x for name, value in case.parameters.items() for x in ("-D", f"{name}={value}")]
-        draw = lambda side: plsys(
-            "render", case.path, "-o", case.folder / "ours.png", "--size", side, *parameters
-        )  # noqa: E731
-        mine, theirs = [], []
-        try:
-            for _ in range(bench.rounds):
-                mine.append((draw("640x480"), draw("1280x960")))
-                theirs.append((mitsuba.render(scene, 640, 480), mitsuba.render(scene, 1280, 960)))
-        except RuntimeError as error:
-            bench.results.note(case.name, f"failed: {error}")
-            continue
-        bench.results.row(
-            case.name, "Mitsuba's wall : ours, whole process", [t[0].wall / m[0].wall for m, t in zip(mine, theirs)], 1.5,
-            ours=f"{mine[0][0].wall:.2f} s", theirs=f"{theirs[0][0].wall:.2f} s",
-        )  # fmt: skip
-        bench.results.row(case.name, "peak, of Mitsuba's", mine[0][0].rss / theirs[0][0].rss, 0.5, at_most=True,
-                          ours=size(mine[0][0].rss), theirs=size(theirs[0][0].rss))  # fmt: skip
-        # What 921,600 more samples cost: start-up and scene drop out.
-        samples = [
-            [0.9216 / max(large.cpu - small.cpu, 1e-3) for small, large in side] for side in (mine, theirs)
-        ]
-        bench.results.row(
-            case.name, "camera samples a CPU-second, of Mitsuba's", [m / t for m, t in zip(*samples)], 1.5,
-            ours=f"{median(samples[0]):.2f} M", theirs=f"{median(samples[1]):.2f} M",
-        )  # fmt: skip
-
-
-def _forest_groups(case: Case):
-    groups, instances = split_forest(case)
-    return [mitsuba.Group("curves", g, True) for g in groups], instances
-
-
-def _menger_groups(four: Case):
-    matrices = four.unfolded()[1]
-    return [mitsuba.Group("quads", box_quads(matrices), True)], [(0, m) for m in matrices]

@@ -1,8 +1,8 @@
 """Measures plsys, POV-Ray, Embree and Mitsuba 3 side by side: same rays, same machine, one run.
 
-    make bench                                  everything, about 20 minutes
-    make bench BENCH='--quick'                  one round, without what takes minutes
-    make bench BENCH='--only scatter,menger'
+    make bench                          everything, about 20 minutes
+    make bench QUICK=1                  one round, without what takes minutes
+    make bench ONLY=scatter,menger
 
 Prints a table of ratios (median, least … most of the rounds), each with its target and whether it is met, and writes
 bench.json and bench.png. One core a process (taskset), where it isn't said otherwise. It asserts nothing: machines differ.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from against_peers import fern, figure, forest, menger, order20, split_by_hand, start
+from against_peers import fern, figure, forest, menger, order20
 from own_curves import fronts, growth, scatter, threads
+from whole_process import split_by_hand, start, unique
 
 MEASURES = {
     "start": start,
@@ -11,6 +12,7 @@ MEASURES = {
     "order20": order20,
     "menger": menger,
     "forest": forest,
+    "unique": unique,
     "fern": fern,
     "scatter": scatter,
     "threads": threads,

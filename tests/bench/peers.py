@@ -69,7 +69,10 @@ def run(command: list, request: object = None, pinned: bool = True, folder: Path
 
 
 def plsys(*arguments: object, pinned: bool = False) -> Run:
-    return run([sys.executable, "-m", "plsys.compiler.cli", *arguments], pinned=pinned)
+    """The command as users run it, where it is installed beside this Python."""
+    script = Path(sys.executable).with_name("plsys")
+    command = [script] if script.exists() else [sys.executable, "-m", "plsys.compiler.cli"]
+    return run([*command, *arguments], pinned=pinned)
 
 
 def ours(case, pinned: bool = True, **request) -> dict:

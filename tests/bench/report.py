@@ -95,9 +95,15 @@ class Results:
             for name, points in self.curves.items():
                 for label, style, xs, ys in lines_of(name, points) if name.startswith(kind) else ():
                     axis.plot(xs, ys, style, label=label)
+                for point in points if name.startswith("fronts") else ():
+                    items = "all" if point["items"] > 1e9 else point["items"]
+                    axis.annotate(items, (point["bytes"] * 1e-6, point["coherent"]), (0, 5), textcoords="offset points", fontsize=7)
             axis.set(title=title, xlabel=x, ylabel=y)
             if logarithmic:
                 axis.set(xscale="log", yscale="log")
+            else:
+                axis.set(ylim=(0, None))
+                axis.xaxis.get_major_locator().set_params(integer=True)
             axis.legend(fontsize=8)
             axis.grid(alpha=0.3)
         figure.savefig(path, dpi=110)
@@ -108,7 +114,7 @@ class Results:
 # By what a curve's name begins with: title, x, y, logarithmic.
 PANELS = {
     "fronts": ("Memory for time: items a front", "MB", "Mray/s, one core", True),
-    "growth": ("Growth: Menger 2 to 10", "primitives", "", True),
+    "growth": ("Growth: Menger 2 to 10, coherent rays", "primitives", "", True),
     "threads": ("Threads", "threads", "Mray/s", False),
 }
 
@@ -129,6 +135,7 @@ def lines_of(name: str, points: list[dict]):
         yield "coherent, Mray/s", "^:", column("primitives"), column("coherent")
     else:
         yield short, "o-", column("threads"), column("rate")
+        yield f"{short}, in proportion", "k:", column("threads"), [points[0]["rate"] * n for n in column("threads")]
 
 
 def number(value: float) -> str:

@@ -141,6 +141,7 @@ def test_curves_are_drawn(tmp_path):
     results = Results()
     assert results.plot(tmp_path / "none.png") == "no plot: no curve was measured"
     point = {
+        "items": 21,
         "bytes": 2e4,
         "coherent": 1.0,
         "random": 0.5,

@@ -3,8 +3,10 @@
     {"scene": "tree.plsys", "parameters": {"order": 10}, "rays": "rays.npz", "repeats": 3, "options": {"accelerator": "bvh"}}
     → {"sets": {"coherent": {"rates": [min, median, max], "hits": 512, "seconds": …}}, "scene_bytes": …, "build_seconds": …}
 
-Only t is asked for, as of the peers. Rates are millions of rays a second. A set is cut off after `most_seconds`: slow
-accelerators trace its first rays only.
+Only t is asked for, as of the peers. Rates are millions of rays a second, of CPU time with one thread and of the clock on
+the wall with several. A set is cut off after `most_seconds`: slow accelerators trace its first rays only.
+
+    {…, "pictures": 2, "size": [640, 480]} → {"pictures": [0.9, 0.4], …}       seconds of drawing the scene again and again
 """
 
 from __future__ import annotations
@@ -23,15 +25,19 @@ from plsys.runtime import Scene
 from plsys.runtime.binding import PlError, PlHits, library, pointer
 
 
+def clock(scene: Scene) -> float:
+    return time.process_time() if scene.statistics["threads"] == 1 else time.perf_counter()
+
+
 def intersect(scene: Scene, origins: np.ndarray, directions: np.ndarray, t: np.ndarray) -> float:
     """Seconds that the foremost hits of these rays take."""
     error, hits = PlError(), PlHits(t=pointer(t))
     with scene._open() as handle:
-        start = time.perf_counter()
+        start = clock(scene)
         done = library().pl_intersect(
             handle, len(t), pointer(origins), pointer(directions), ctypes.byref(hits), ctypes.byref(error)
         )
-        seconds = time.perf_counter() - start
+        seconds = clock(scene) - start
     if not done:
         error.raise_()
     return seconds
@@ -59,18 +65,31 @@ def measure(scene: Scene, rays: np.ndarray, repeats: int, most_seconds: float) -
     }
 
 
+def draw(scene: Scene, size: tuple[int, int], times: int) -> list[float]:
+    """Seconds of each of the pictures; the first one finds caches cold."""
+    pixels, seconds = bytearray(3 * size[0] * size[1]), []
+    for _ in range(times):
+        start = clock(scene)
+        scene.render_into({"srgb": pixels}, *size)
+        seconds.append(clock(scene) - start)
+    return seconds
+
+
 def main() -> None:
     request = json.load(sys.stdin)
     compilation = build(Source.read(request["scene"]), parameters=request["parameters"])
     data = compilation.encode()
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     options = dict(request["options"])
-    start = time.perf_counter()
+    now = time.process_time if request.get("threads", 1) == 1 else time.perf_counter
+    start = now()
     with Scene(data, threads=request.get("threads", 1), **options) as scene:
-        build_seconds = time.perf_counter() - start
+        build_seconds = now() - start
         answer: dict = {"build_seconds": build_seconds, "sets": {}}
+        if request.get("pictures"):
+            answer["pictures"] = draw(scene, request["size"], request["pictures"])
         with np.load(request["rays"]) as sets:
-            for name in request.get("sets") or sets.files:
+            for name in () if request.get("pictures") else request.get("sets") or sets.files:
                 answer["sets"][name] = measure(scene, sets[name], request["repeats"], request["most_seconds"])
         if request.get("hits"):
             t = {}
@@ -83,7 +102,7 @@ def main() -> None:
         statistics = scene.statistics
     answer |= {
         name: statistics[name]
-        for name in ("scene_bytes", "primitives", "states", "box_tests", "primitive_tests")
+        for name in ("scene_bytes", "primitives", "states", "box_tests", "primitive_tests", "lazy", "rays", "front")
     }
     answer["rss_growth"] = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
     json.dump(answer, sys.stdout)

@@ -33,8 +33,9 @@ def test_render_json(tmp_path, capsys):
     assert told["accelerator"] == "bvh" and told["povray_epsilon"] is False
     assert told["primitives"] == 2049 and told["states"] == 13
     assert told["rays"]["primary"] == 48 * 36 and told["rays"]["shadow"] > 0 and told["rays"]["reflection"] == 0
-    assert set(told["seconds"]) == {"read", "verify", "states", "build", "trace", "write", "first_pixel"}
+    assert set(told["seconds"]) == {"read", "verify", "states", "build", "trace", "trace_cpu", "write", "first_pixel"}
     assert told["seconds"]["read"] < told["seconds"]["first_pixel"] < sum(told["seconds"].values())
+    assert told["seconds"]["trace_cpu"] > 0
     assert told["memory"]["scene_bytes"] > 0 and told["memory"]["peak_rss_bytes"] > 1e6
     assert all(set(row) == {"what", "why"} for row in told["left_out"])
     assert told["image"] == str(tmp_path / "t.png")
