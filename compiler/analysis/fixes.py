@@ -16,7 +16,7 @@ from ..reading.codes import CODES
 from .actions import Action, Spot, TextEdit
 from .document import Document, Message
 from .fixes_scene import SCENE_FIXES
-from .fixes_text import HINT_FIXES, TEXT_FIXES
+from .fixes_text import HINT_FIXES, TEXT_FIXES, short
 from .scene import Scene
 
 Found = tuple[str, list[TextEdit]] | None
@@ -35,6 +35,9 @@ def fixes(scene: Scene, document: Document, message: Message) -> Iterator[Action
     preferred = True
     seen: set[tuple] = set()
     sources = [(found.hint, BY_HINT[:1]), (found.message, FIXES.get(found.code, ())), (found.hint, BY_HINT[1:])]
+    if found.mend is not None:
+        yield _mended(spot, found.mend, message)
+        return
     for text, rows in sources:
         for pattern, fix in rows:
             match = re.search(pattern, text)
@@ -44,6 +47,14 @@ def fixes(scene: Scene, document: Document, message: Message) -> Iterator[Action
             seen.add(tuple(made[1]))
             yield Action(made[0], "quickfix", tuple(made[1]), preferred, message)
             preferred = False
+
+
+def _mended(spot: Spot, mend: str, message: Message) -> Action:
+    """The action for a message that brings its mend along."""
+    if not mend:
+        return Action(f"Remove '{spot.text.strip()}'", "quickfix", (spot.cut(spot.start, spot.end),), True, message)
+    written = mend.strip() or mend
+    return Action(f"Write '{short(written)}'", "quickfix", (spot.replace(mend),), True, message)
 
 
 def ignoring(scene: Scene, document: Document, message: Message) -> Iterator[Action]:

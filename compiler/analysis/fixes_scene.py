@@ -232,6 +232,9 @@ def property_first(spot: Spot, match: re.Match, message: Message) -> Found:
 
 def remove_property(spot: Spot, match: re.Match, message: Message) -> Found:
     part = _property(spot)
+    node = spot.document.node_at(spot.start)[0]
+    if part is not None and node.parent is not None and node.parent.type not in ("block", "block_body"):
+        return None  # a value, without which something else is missing
     return (f"Remove '{spot.slice(spot.start, spot.end)}'", [spot.cut(*part)]) if part else None
 
 

@@ -37,7 +37,7 @@ def replace(text: str):
 def remove(spot: Spot, match: re.Match, message: Message) -> Found:
     if spot.start == spot.end:
         return None
-    return f"Remove '{_short(spot.text)}'", [spot.cut(spot.start, spot.end)]
+    return f"Remove '{short(spot.text)}'", [spot.cut(spot.start, spot.end)]
 
 
 def write_hint(spot: Spot, match: re.Match, message: Message) -> Found:
@@ -45,7 +45,7 @@ def write_hint(spot: Spot, match: re.Match, message: Message) -> Found:
     written = re.search(r"\bwrite (.+)$", message.diagnostic.hint)
     if written is None or "…" in written[1]:
         return None
-    return f"Write '{_short(written[1])}'", [spot.replace(written[1])]
+    return f"Write '{short(written[1])}'", [spot.replace(written[1])]
 
 
 def suggestion(spot: Spot, match: re.Match, message: Message) -> Found:
@@ -114,7 +114,7 @@ def touching_values(spot: Spot, match: re.Match, message: Message) -> Found:
 def without_call_brackets(spot: Spot, match: re.Match, message: Message) -> Found:
     name, _, arguments = spot.text.partition("(")
     written = f"{name} {arguments.rstrip().removesuffix(')')}".rstrip()
-    return f"Write '{_short(written)}'", [spot.replace(written)]
+    return f"Write '{short(written)}'", [spot.replace(written)]
 
 
 def closed_up_call(spot: Spot, match: re.Match, message: Message) -> Found:
@@ -151,7 +151,7 @@ def _code_end(data: bytes) -> int:
     return max((match.end() for match in tokens if match[0][:2] not in (b"//", b"/*")), default=0)
 
 
-def _short(text: str) -> str:
+def short(text: str) -> str:
     line = text.split("\n")[0]
     return line if line == text and len(line) <= 40 else line[:37] + "…"
 

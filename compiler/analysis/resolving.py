@@ -31,8 +31,10 @@ class Router(Diagnostics):
         super().__init__()
         self.messages = messages
 
-    def add(self, code: str, span: Span, message: str, hint: str = "", notes: Iterable[Note] = ()) -> None:
-        super().add(code, span, message, hint, notes)
+    def add(
+        self, code: str, span: Span, message: str, hint: str = "", notes: Iterable[Note] = (), mend: str | None = None
+    ) -> None:
+        super().add(code, span, message, hint, notes, mend)
         found = self.items.pop()
         if facts_of(span.source).is_broken:  # type: ignore[arg-type]
             return

@@ -37,12 +37,15 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
+    """``mend`` is the text that, in the place of ``span``, surely says what was meant; None where nothing is sure."""
+
     code: str
     severity: str
     message: str
     span: Span
     hint: str = ""
     notes: tuple[Note, ...] = ()
+    mend: str | None = None
 
     def as_json(self) -> dict:
         """``{path, code, severity, message, line, column, end_line, end_column, hint}``; lines and columns from 1."""
@@ -83,9 +86,11 @@ class Diagnostics:
 
     items: list[Diagnostic] = field(default_factory=list)
 
-    def add(self, code: str, span: Span, message: str, hint: str = "", notes: Iterable[Note] = ()) -> None:
+    def add(
+        self, code: str, span: Span, message: str, hint: str = "", notes: Iterable[Note] = (), mend: str | None = None
+    ) -> None:
         """Add a message; its severity is the code's. A code without a row in CODES is a KeyError."""
-        self.items.append(Diagnostic(code, CODES[code].severity, message, span, hint, tuple(notes)))
+        self.items.append(Diagnostic(code, CODES[code].severity, message, span, hint, tuple(notes), mend))
 
     @property
     def has_errors(self) -> bool:

@@ -51,6 +51,9 @@ def nearest_of(name: str, indexes: Sequence[NameIndex]) -> str:
 
 
 def _hint(name: str, names: list[str]) -> str:
+    same = next((other for other in names if other.casefold() == name.casefold()), None)
+    if same is not None:
+        return f"did you mean '{same}'?"
     import difflib  # only for who mistypes
 
     matches = difflib.get_close_matches(name, names, n=1, cutoff=0.6)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from . import syntax
+from . import syntax, vocabulary
 from .mistakes import RULE
 from .parse_statements import statements
 from .parse_values import MAX_DEPTH, Reading, TooDeep, call, expression, is_stray, name
@@ -349,14 +349,20 @@ class _Body:
 
     # --- entries
 
+    def is_own(self, item: object) -> bool:
+        """Whether an item of a term is the Selection's own name."""
+        return isinstance(item, syntax.Name) and item.name == self.own_name
+
     def entry_action(self, union: syntax.Union) -> syntax.Term | None:
         """The entry action, if ``union`` looks like one: ``C_initialize Tree``."""
         items = union.terms[0].items
         first, last = items[0], items[-1]
-        if len(union.terms) > 1 or (isinstance(first, syntax.Name) and first.name == self.own_name):
+        if len(union.terms) > 1 or self.is_own(first):
             return None
         if isinstance(last, syntax.Name) and last.name == self.own_name:
             return union.terms[0]
+        if isinstance(last, syntax.Name) and last.name in vocabulary.PRIMITIVES:
+            return None  # a rule without its name
         if len(items) <= 2 and all(isinstance(item, syntax.Name | syntax.Inline) for item in items):
             written = " ".join(item.name for item in items[:1] if isinstance(item, syntax.Name)) or "[…]"
             self.reading.complain(
@@ -378,13 +384,20 @@ class _Body:
             and isinstance(last, syntax.Name)
             and last.name == self.own_name
         )
-        if is_entry and not (isinstance(first, syntax.Name) and first.name == self.own_name):
+        if is_entry and not self.is_own(first):
             self.reading.complain(
                 union.span,
                 "an entry action is the first line of its Selection",
                 "join several into one: C_a C_b Name;",
             )
             return None
+        if isinstance(last, syntax.Name) and last.name in vocabulary.PRIMITIVES and not self.is_own(first):
+            start = self.reading.after(union.span.start)
+            message = "the name of its Selection stands before what a rule produces"
+            mend = f"{self.own_name} -> "
+            self.reading.complain(start, message, f"write {mend}…;", "missing", mend=mend)
+            rule = syntax.Rule(piece.span, syntax.Name(start, self.own_name), (syntax.Alternative(union.span, None, union),))
+            return piece._replace(kind="rule", value=rule)
         if not isinstance(first, syntax.Name | syntax.Call):
             self.reading.complain(union.span, "this is no rule", RULE)
             return None

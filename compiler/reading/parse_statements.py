@@ -16,7 +16,13 @@ from .source import Span
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-_LOOPS = ("for", "while", "do", "return")
+_REPEAT = "a Selection repeats: Selection Row { if (n > 0) Row -> C_count Row; }"
+_FOREIGN = {
+    "for": _REPEAT,
+    "while": _REPEAT,
+    "do": _REPEAT,
+    "return": "a Calculation assigns its results: n = 2;",
+}
 
 
 def statements(
@@ -77,8 +83,7 @@ def _split_lines(reading: Reading, parts: list[Node]) -> list[tuple[int, int]]:
 
 
 def _one_operation(reading: Reading, parts: list[Node]) -> syntax.Operation:
-    if reading.text(parts[0]) in _LOOPS:
-        hint = "a Selection repeats: Selection Row { if (n > 0) Row -> C_count Row; }"
+    if (hint := _FOREIGN.get(reading.text(parts[0]))) is not None:
         raise Abandon(reading.span(parts[0]), f"'{reading.text(parts[0])}' is no statement", hint)
     commas = [part for part in parts if part.type == ","]
     arguments = expressions(reading, [part for part in parts[1:] if part.type != ","], 0)

@@ -21,6 +21,8 @@ from .diagnostics import Diagnostics, Note
 from .source import Source, Span
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from tree_sitter import Node
 
 # Brackets, operators, blocks and guards nest no deeper, so that this and all later stages, which recurse with
@@ -30,6 +32,20 @@ MAX_DEPTH = 128
 _NUMBER = re.compile(r"\d+(\.\d+)?([eE][+-]?\d+)?")
 _ESCAPE = re.compile(r"\\(.)")
 _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
+
+
+# How numbers are written elsewhere: pattern, message, hint (empty: to write the number that the last column makes of it).
+_MALFORMED: tuple[tuple[re.Pattern[str], str, str, Callable[[re.Match[str]], str] | None], ...] = (
+    (re.compile(r"\.\d+([eE]\d+)?"), r"'\g<0>' lacks a digit before the point", "", lambda match: f"0{match[0]}"),
+    (re.compile(r"(\d+)\.([eE]\d+)?"), r"'\g<0>' lacks a digit after the point", "", lambda match: f"{match[1]}.0{match[2] or ''}"),
+    (re.compile(r"0[xX]([0-9a-fA-F]{1,16})"), r"'\g<0>' isn't written in tens", "", lambda match: str(int(match[1], 16))),
+    (re.compile(r"\d+(_\d+)+(\.\d+)?"), "'_' can't stand in the number \\g<0>", "", lambda match: match[0].replace("_", "")),
+    (re.compile(r"(\d+(?:\.\d+)?)[fFlLdD]"), r"'\g<0>' ends with a letter: all numbers are of one kind", "", lambda match: match[1]),
+    (re.compile(r"(\d+(?:\.\d+)?)deg"), "an angle has no unit: all are degrees", "", lambda match: match[1]),
+    (re.compile(r"(\d+(?:\.\d+)?)([A-Za-z_]\w*)"), r"the number \1 touches the name \2",
+     r"write \1*\2 for the product, or a space between two values", None),
+    (re.compile(r".*", re.DOTALL), r"'\g<0>' is no number", "a number looks like 2, 0.5 or 1.5e-3", None),
+)
 
 
 class Abandon(Exception):
@@ -67,9 +83,10 @@ class Reading:
         hint: str = "",
         code: str = "syntax",
         notes: tuple[Note, ...] = (),
+        mend: str | None = None,
     ) -> None:
         span = node if isinstance(node, Span) else self.span(node)
-        self.diagnostics.add(code, span, message, hint, notes)
+        self.diagnostics.add(code, span, message, hint, notes, mend)
 
     def after(self, offset: int) -> Span:
         """The empty place at ``offset``, for what is missing there."""
@@ -171,21 +188,14 @@ def number(reading: Reading, node: Node, depth: int = 0) -> syntax.Number | None
 
 def _malformed_number(reading: Reading, node: Node, text: str) -> syntax.Number:
     """Explain ``.5``, ``5.``, ``2x`` or ``1.5.2``, and read on with the number at its start."""
-    if re.fullmatch(r"\.\d+([eE]\d+)?", text):
-        reading.complain(node, f"'{text}' lacks a digit before the point", f"write 0{text}")
-        text = "0" + text
-    elif match := re.fullmatch(r"(\d+)\.([eE]\d+)?", text):
-        fixed = f"{match[1]}.0{match[2] or ''}"
-        reading.complain(node, f"'{text}' lacks a digit after the point", f"write {fixed}")
-        text = fixed
-    elif match := re.fullmatch(r"(\d+(?:\.\d+)?)([A-Za-z_]\w*)", text):
-        reading.complain(
-            node,
-            f"the number {match[1]} touches the name {match[2]}",
-            f"write {match[1]}*{match[2]} for the product, or a space between two values",
-        )
-    else:
-        reading.complain(node, f"'{text}' is no number", "a number looks like 2, 0.5 or 1.5e-3")
+    read = text
+    for pattern, message, hint, mend in _MALFORMED:
+        if match := pattern.fullmatch(text):
+            read = mend(match) if mend else text
+            hint = hint or f"write {read}"
+            reading.complain(node, match.expand(message), match.expand(hint), mend=read if mend else None)
+            break
+    text = read
     start = _NUMBER.match(text)
     return syntax.Number(reading.span(node), float(start[0]) if start else 0.0, text)
 

@@ -183,7 +183,10 @@ class Items:
         name = item.name if isinstance(item, syntax.Block | syntax.Call) else item
         if not isinstance(name, syntax.Name):
             self.skip_value()
-            return Problem("wrong-value", item.span, f"{self.what} has no use for this")
+            hint = f"it has: {' '.join(rows)}" if rows else ""
+            if isinstance(item, syntax.Number):
+                hint = "a vector is written <x, y, z>"
+            return Problem("wrong-value", item.span, f"{self.what} has no use for this", hint)
         self.skip_value()
         if not name.name:
             return Problem()

@@ -60,14 +60,16 @@ class Problem(Exception):
         message: str = "",
         hint: str = "",
         notes: Iterable[Note] = (),
+        mend: str | None = None,
     ) -> None:
         super().__init__(message)
         self.code, self.span, self.message, self.hint, self.notes = code, span, message, hint, tuple(notes)
+        self.mend = mend
 
     def report(self, diagnostics: Diagnostics) -> None:
         if self.code:
             assert self.span is not None
-            diagnostics.add(self.code, self.span, self.message, self.hint, self.notes)
+            diagnostics.add(self.code, self.span, self.message, self.hint, self.notes, self.mend)
 
 
 @dataclass
@@ -266,10 +268,14 @@ def vocabulary_names(kind: str) -> Iterable[str]:
     }.get(kind, ())
 
 
+_TRUTHS = {"true": "1", "yes": "1", "on": "1", "false": "0", "no": "0", "off": "0"}
+
+
 def unsupported(name: syntax.Name) -> Problem:
     """What to say of a POV-Ray feature that plsys doesn't have."""
     hint = vocabulary.UNSUPPORTED[name.name]
-    return Problem("unsupported", name.span, f"POV-Ray's '{name.name}' isn't supported", hint)
+    mend = _TRUTHS.get(name.name)
+    return Problem("unsupported", name.span, f"POV-Ray's '{name.name}' isn't supported", hint, mend=mend)
 
 
 def assigned_names(node: syntax.Definition) -> Iterator[syntax.Name]:

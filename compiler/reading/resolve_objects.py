@@ -21,6 +21,7 @@ from .resolve_names import OBJECT_BLOCKS, Entry, Names, Problem
 from .resolve_shapes import corners, shape
 from .resolve_terms import Terms
 from .resolve_textures import TRANSFORMATIONS, Look, Textures
+from .source import Span
 from .vocabulary import BLOCKS as BLOCK_ROWS
 from .vocabulary import MODIFIERS
 
@@ -202,6 +203,15 @@ class Objects:
 
     def _mesh(self, items: Items) -> Operand:
         triangles = []
+        if isinstance(path := items.peek(), syntax.String):
+            mend = f"object {{ mesh({path.span.text})"
+            raise Problem(
+                "wrong-arguments",
+                Span(path.span.source, items.span.start, path.span.end),
+                "a mesh block holds triangles; a mesh from a file is a primitive",
+                f"write {mend} }}",
+                mend=mend,
+            )
         while isinstance(items.peek(), syntax.Block) and items.word() in ("triangle", "smooth_triangle"):
             block = items.take()
             assert isinstance(block, syntax.Block)

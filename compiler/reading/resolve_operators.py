@@ -75,16 +75,17 @@ class Operators:
             return self._assignment(node)
         row = vocabulary.OPERATIONS.get(node.name.name)
         if row is None:
-            raise self._unknown(node.name)
+            raise self._unknown(node)
         if row.name == "variants":
             return self._variants(node)
         arguments = []
         for argument in node.arguments:
             if isinstance(argument, syntax.Vector):
                 hint = f"{row.name}'s numbers stand side by side: {row.signature}"
-                raise Problem(
-                    "wrong-arguments", argument.span, f"{row.name} takes numbers, not a vector", hint
-                )
+                is_alone = len(node.arguments) == 1 and row.accepts(len(argument.components))
+                mend = ", ".join(each.span.text for each in argument.components) if is_alone else None
+                message = f"{row.name} takes numbers, not a vector"
+                raise Problem("wrong-arguments", argument.span, message, hint, mend=mend)
             arguments.append(self.expressions.number(argument, RULES))
         self._count(row, node)
         uniform = row.name == "scale" and len(arguments) == 1
@@ -130,20 +131,49 @@ class Operators:
         message = f"the Transformation {name} can't calculate"
         return Problem("wrong-kind", node.span, message, "put this into a Calculation")
 
-    def _unknown(self, name: syntax.Name) -> Problem:
+    def _unknown(self, node: syntax.Operation) -> Problem:
+        name = node.name
         if name.name in POV_NAMES:
             hint = f"in a Transformation it is {POV_NAMES[name.name]}, with the numbers side by side"
-            return Problem(
-                "unknown-name", name.span, f"'{name.name}' is POV-Ray's modifier of scene objects", hint
-            )
+            mend = _from_povray(node)
+            span = name.span if mend is None else node.span
+            message = f"'{name.name}' is POV-Ray's modifier of scene objects"
+            return Problem("unknown-name", span, message, f"write {mend}" if mend else hint, mend=mend)
         if (entry := self.names.entries.get(name.name)) is not None:
             message = f"'{name.name}' is {ARTICLES[entry.kind]}, not an operation"
             hint = f"to assign it, write {name.name} = …" if entry.kind == "parameter" else ""
+            if entry.kind == "selection":
+                hint = f"what {name.name} produces is joined by '+': {name.name} + …"
             return Problem("wrong-kind", name.span, message, hint)
         problem = self.names.unknown(name, (), "an operation")
         problem.hint = problem.hint or nearest(name.name, vocabulary.OPERATIONS)
         problem.hint = problem.hint or f"operations are {' '.join(vocabulary.OPERATIONS)}"
         return problem
+
+
+def _from_povray(node: syntax.Operation) -> str | None:
+    """POV-Ray's ``translate`` or ``rotate`` of one vector in our operations; None for other arguments. POV-Ray turns about
+    x first; here the last operation acts first."""
+    if len(node.arguments) != 1 or node.name.name not in ("translate", "rotate"):
+        return None
+    (argument,) = node.arguments
+    match argument:
+        case syntax.Vector(components=components) if len(components) == 3:
+            parts = [None if _is_zero(each) else each.span.text for each in components]
+        case syntax.Binary(operator="*", left=syntax.Name(name=axis), right=factor) | syntax.Binary(
+            operator="*", left=factor, right=syntax.Name(name=axis)
+        ) if axis in ("x", "y", "z"):
+            parts = [factor.span.text if each == axis else None for each in "xyz"]
+        case _:
+            return None
+    if node.name.name == "translate":
+        return f"trans {', '.join(part or '0' for part in parts)}"
+    turns = [f"rot{axis} {part}" for axis, part in zip("xyz", parts) if part is not None]
+    return "; ".join(reversed(turns)) or None
+
+
+def _is_zero(node: syntax.Expression) -> bool:
+    return isinstance(node, syntax.Number) and node.value == 0
 
 
 def _calculates(node: syntax.Statement) -> bool | None:
