@@ -16,7 +16,7 @@ from . import affine
 from .check_scaling import Back, linear_map
 from .diagnostics import Diagnostics
 from .linear import NOTHING, Form, after, difference, form
-from .model import Apply, Assign, Calculate, Constant, Enter, Expression, Model, Read, Symbol
+from .model import Apply, Assign, Calculate, Enter, Expression, Model, Read
 from .walk import Way, components, draws, operators_of, seed_of
 
 # Rounds of a counter that are tried out to see whether it meets a value.
