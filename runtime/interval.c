@@ -12,11 +12,12 @@ enum { MOST_FORKS = 10, MOST_PARAMETERS = 256 };
 
 static const pl_range everything = {-INFINITY, INFINITY}, truths = {0.0, 1.0};
 
-/* Our functions err by less than an ulp; two steps outward are enough. */
+/* Our functions err by less than an ulp; two ulps outward, and a denormal one for zeros, are enough. */
 static pl_range outward(double lo, double hi)
 {
-    if (isnan(lo) || isnan(hi)) return everything;
-    return (pl_range){nextafter(nextafter(lo, -INFINITY), -INFINITY), nextafter(nextafter(hi, INFINITY), INFINITY)};
+    lo -= fabs(lo) * 0x1p-51 + 0x1p-1074;
+    hi += fabs(hi) * 0x1p-51 + 0x1p-1074;
+    return isnan(lo) || isnan(hi) ? everything : (pl_range){lo, hi};
 }
 
 pl_range pl_range_add(pl_range a, pl_range b)
@@ -47,12 +48,23 @@ static bool contains(pl_range a, double x)
     return a.lo <= x && x <= a.hi;
 }
 
+static double most(pl_range a)
+{
+    return fmax(fabs(a.lo), fabs(a.hi));
+}
+
+static double least(pl_range a)
+{
+    return contains(a, 0.0) ? 0.0 : fmin(fabs(a.lo), fabs(a.hi));
+}
+
 /* sin where the phase is 90, cos where it is 0: between extremes, which stand at phase + k·180, it is monotone. */
 static pl_range wave(int opcode, pl_range a, double phase)
 {
     if (!(a.hi - a.lo < 360.0)) return (pl_range){-1.0, 1.0};
     double p = pl_elementary(opcode, a.lo, 0, 0), q = pl_elementary(opcode, a.hi, 0, 0);
     pl_range r = outward(fmin(p, q), fmax(p, q));
+    if (!(most(a) < 0x1p40)) return (pl_range){-1.0, 1.0};
     for (double k = floor((a.lo - phase) / 180.0) - 1.0; k <= ceil((a.hi - phase) / 180.0) + 1.0; k++) {
         if (!contains(outward(a.lo, a.hi), phase + 180.0 * k)) continue;
         if (fmod(k, 2.0) == 0.0) r.hi = 1.0;
@@ -165,36 +177,31 @@ static void identity(pl_range_map *map)
     map->stretch = map->inverse_stretch = 1.0;
 }
 
-static pl_range dot(const pl_range *row, int step, const pl_range *b)
+/* Entries of matrices: zeros and ones, of which there are many, stay exact. */
+static pl_range times(pl_range a, pl_range b)
 {
-    pl_range sum = pl_range_of(0.0);
-    for (int k = 0; k < 3; k++) {
-        pl_range p = pl_range_apply(PL_OP_MULTIPLY, row[k], b[step * k], sum);
-        sum = pl_range_apply(PL_OP_ADD, sum, p, sum);
-    }
-    return sum;
+    if (a.lo == a.hi && (a.lo == 0.0 || a.lo == 1.0)) return a.lo == 0.0 ? a : b;
+    if (b.lo == b.hi && (b.lo == 0.0 || b.lo == 1.0)) return b.lo == 0.0 ? b : a;
+    return pl_range_multiply(a, b);
+}
+
+static pl_range plus(pl_range a, pl_range b)
+{
+    if (a.lo == 0.0 && a.hi == 0.0) return b;
+    if (b.lo == 0.0 && b.hi == 0.0) return a;
+    return pl_range_add(a, b);
 }
 
 static void multiply(pl_range_map *map, const pl_range step[12])
 {
     for (int r = 0; r < 3; r++) {
-        pl_range row[4];
-        memcpy(row, map->m + 4 * r, sizeof row);
+        pl_range row[4], *m = map->m + 4 * r;
+        memcpy(row, m, sizeof row);
         for (int c = 0; c < 4; c++) {
-            map->m[4 * r + c] = dot(row, 4, step + c);
-            if (c == 3) map->m[4 * r + 3] = pl_range_apply(PL_OP_ADD, map->m[4 * r + 3], row[3], row[3]);
+            m[c] = plus(plus(times(row[0], step[c]), times(row[1], step[4 + c])), times(row[2], step[8 + c]));
+            if (c == 3) m[3] = plus(m[3], row[3]);
         }
     }
-}
-
-static double most(pl_range a)
-{
-    return fmax(fabs(a.lo), fabs(a.hi));
-}
-
-static double least(pl_range a)
-{
-    return contains(a, 0.0) ? 0.0 : fmin(fabs(a.lo), fabs(a.hi));
 }
 
 /* Stretches of a general linear part: the Frobenius norm, and that of the adjugate over the determinant. */
@@ -216,57 +223,70 @@ static void general_stretch(const pl_range s[12], double *stretch, double *inver
     *inverse = least(determinant) > 0.0 ? sqrt(adjugate) / least(determinant) * (1.0 + 1e-12) : INFINITY;
 }
 
-static void rotation_step(pl_range step[12], int i, int j, pl_range degrees)
+static void rotate(pl_range_map *map, int i, int j, pl_range degrees)
 {
-    pl_range c = pl_range_apply(PL_OP_COS, degrees, degrees, degrees), s = pl_range_apply(PL_OP_SIN, degrees, degrees, degrees);
-    step[5 * i] = step[5 * j] = c;
-    step[4 * i + j] = (pl_range){-s.hi, -s.lo};
-    step[4 * j + i] = s;
+    const pl_range c = pl_range_apply(PL_OP_COS, degrees, degrees, degrees), s = pl_range_apply(PL_OP_SIN, degrees, degrees, degrees);
+    for (int r = 0; r < 3; r++) {
+        pl_range *row = map->m + 4 * r, a = row[i], b = row[j];
+        row[i] = plus(times(a, c), times(b, s));
+        row[j] = plus(times(b, c), times(a, (pl_range){-s.hi, -s.lo}));
+    }
+}
+
+static void scale_columns(pl_range_map *map, const pl_range *a, int step)
+{
+    double largest = 0.0, smallest = INFINITY;
+    for (int c = 0; c < 3; c++) {
+        for (int r = 0; r < 3; r++) map->m[4 * r + c] = times(map->m[4 * r + c], a[step * c]);
+        largest = fmax(largest, most(a[step * c]));
+        smallest = fmin(smallest, least(a[step * c]));
+    }
+    map->stretch *= largest;
+    map->inverse_stretch *= smallest > 0.0 ? 1.0 / smallest : INFINITY;
+}
+
+static void general_step(pl_range_map *map, const pl_range step[12])
+{
+    double stretch, inverse;
+    general_stretch(step, &stretch, &inverse);
+    map->stretch *= stretch;
+    map->inverse_stretch *= inverse;
+    multiply(map, step);
 }
 
 /* M := M · step; false: nothing is known. */
 static bool transform(pl_range_map *map, uint8_t opcode, const pl_range *a)
 {
     pl_range step[12];
-    double stretch = 1.0, inverse = 1.0;
     for (int i = 0; i < 12; i++) step[i] = pl_range_of(i % 5 == 0 ? 1.0 : 0.0);
     for (int i = 0; i < pl_op_row_of(opcode)->pops; i++)
         if (!(isfinite(a[i].lo) && isfinite(a[i].hi))) return false;
     switch (opcode) {
     case PL_OP_TRANS:
-        for (int r = 0; r < 3; r++) step[4 * r + 3] = a[r];
-        break;
-    case PL_OP_ROTX: rotation_step(step, 1, 2, a[0]); break;
-    case PL_OP_ROTY: rotation_step(step, 2, 0, a[0]); break;
-    case PL_OP_ROTZ: rotation_step(step, 0, 1, a[0]); break;
-    case PL_OP_SCALE:
-    case PL_OP_SCALE_UNIFORM: {
-        double smallest = INFINITY;
-        stretch = 0.0;
-        for (int i = 0; i < 3; i++) {
-            pl_range s = step[5 * i] = opcode == PL_OP_SCALE ? a[i] : a[0];
-            stretch = fmax(stretch, most(s));
-            smallest = fmin(smallest, least(s));
+        for (int r = 0; r < 3; r++) {
+            pl_range *row = map->m + 4 * r;
+            row[3] = plus(plus(plus(times(row[0], a[0]), times(row[1], a[1])), times(row[2], a[2])), row[3]);
         }
-        inverse = smallest > 0.0 ? 1.0 / smallest : INFINITY;
         break;
-    }
+    case PL_OP_ROTX: rotate(map, 1, 2, a[0]); break;
+    case PL_OP_ROTY: rotate(map, 2, 0, a[0]); break;
+    case PL_OP_ROTZ: rotate(map, 0, 1, a[0]); break;
+    case PL_OP_SCALE: scale_columns(map, a, 1); break;
+    case PL_OP_SCALE_UNIFORM: scale_columns(map, a, 0); break;
     case PL_OP_ROT: /* any rotation: entries are within [-1, 1] */
         for (int i = 0; i < 12; i++)
             if (i % 4 != 3) step[i] = (pl_range){-1.0, 1.0};
+        multiply(map, step);
         break;
     case PL_OP_SHEAR:
         for (int i = 0; i < 6; i++) step[(const int[]){1, 2, 4, 6, 8, 9}[i]] = a[i];
-        general_stretch(step, &stretch, &inverse);
+        general_step(map, step);
         break;
     default:
         for (int i = 0; i < 12; i++) step[4 * (i % 3) + i / 3] = a[i];
-        general_stretch(step, &stretch, &inverse);
+        general_step(map, step);
         break;
     }
-    map->stretch *= stretch;
-    map->inverse_stretch *= inverse;
-    multiply(map, step);
     return true;
 }
 

@@ -29,7 +29,10 @@ double pl_largest_stretch(const pl_affine *map)
             s[i][j] = 0.0;
             for (int r = 0; r < 3; r++) s[i][j] += (map->m[4 * r + i] / scale) * (map->m[4 * r + j] / scale);
         }
+    /* Convergence is quadratic; what is left beside the diagonal is then lost in the factor below. */
     for (int sweep = 0; sweep < 8; sweep++) {
+        double off = fabs(s[0][1]) + fabs(s[0][2]) + fabs(s[1][2]);
+        if (off <= 8.0 * DBL_EPSILON * (s[0][0] + s[1][1] + s[2][2])) break;
         rotate(s, 0, 1);
         rotate(s, 0, 2);
         rotate(s, 1, 2);

@@ -10,10 +10,20 @@
 
 #include "../error.h"
 
+/* What one ray may do before it is given up: nodes visited to unfold states and to bound classes, and instances entered
+ * of which nothing is known. The first is hundreds of times what a ray needs that grazes all trees of a forest; a path has
+ * no more symbols than the second. */
+#define MOST_WORK (UINT64_C(1) << 24)
+enum { MOST_UNKNOWN = PL_LIMIT_DEPTH };
+
+/* Frames from the end that pin their states: a path may be longer than the cache is large. */
+enum { PINNED = 16 };
+
+/* Frames are the instances on one path from the root, so frame i is the parent of frame i + 1. */
 typedef struct frame {
-    pl_lazy_state *state;
-    const pl_item *item; /* of the parent frame's state; NULL at the root */
-    uint32_t parent, depth;
+    pl_lazy_state *state; /* NULL: not pinned any more */
+    uint32_t symbol, terms; /* terms on the path up to here */
+    size_t scope;           /* in `scopes`: what the state is found by again */
     double o[3], d[3];
 } frame;
 
@@ -26,7 +36,12 @@ typedef struct work {
     pl_unfolder *unfolder;
     frame *frames;
     pending *stack;
-    size_t frame_count, frame_capacity, stack_count, stack_capacity;
+    uint64_t *scopes;
+    pl_path path; /* to the last frame */
+    size_t frame_count, frame_capacity, stack_count, stack_capacity, scope_capacity;
+    size_t scope_words;
+    uint64_t spent; /* for this ray */
+    uint32_t unknown;
 } work;
 
 static void work_destroy(void *memory)
@@ -36,13 +51,18 @@ static void work_destroy(void *memory)
     pl_unfolder_free(w->unfolder);
     free(w->frames);
     free(w->stack);
+    free(w->scopes);
+    free(w->path.terms);
     free(w);
 }
 
 static void *work_create(const pl_scene *scene, pl_error *error)
 {
     work *w = calloc(1, sizeof *w);
-    if (w && (w->unfolder = pl_unfolder_create(scene, error))) return w;
+    if (w && (w->unfolder = pl_unfolder_create(scene, error))) {
+        w->scope_words = pl_scope_words(scene->program, &(pl_scope){.draws = 0});
+        return w;
+    }
     free(w);
     pl_fail_memory(error, "preparing to trace");
     return NULL;
@@ -59,9 +79,15 @@ static bool grow(void *array, size_t count, size_t *capacity, size_t element, pl
     return true;
 }
 
+static void leave(frame *f)
+{
+    if (f->state) pl_lazy_release(f->state);
+    f->state = NULL;
+}
+
 static void leave_frames(work *w, size_t count)
 {
-    while (w->frame_count > count) pl_lazy_release(w->frames[--w->frame_count].state);
+    while (w->frame_count > count) leave(&w->frames[--w->frame_count]);
 }
 
 /* Pushes the items that the ray meets, the nearest last. */
@@ -79,7 +105,7 @@ static bool push_items(work *w, uint32_t index, pl_query *query, pl_counters *co
             counters->box_tests++;
             if (pl_box_is_empty(&it->box)) continue;
             if (!pl_slab_hits(&slab, &it->box, query->t_min, query->t_max, &t_entry)) {
-                if (f->depth > counters->miss_depth) counters->miss_depth = f->depth;
+                if (index > counters->miss_depth) counters->miss_depth = index;
                 continue;
             }
         }
@@ -91,60 +117,93 @@ static bool push_items(work *w, uint32_t index, pl_query *query, pl_counters *co
     return true;
 }
 
-/* Goes into an instance whose ray stands in o and d. */
-static bool enter(pl_tracer *tracer, uint32_t symbol, const uint64_t *scope, const frame *as, pl_query *query)
+static bool fail_work(const pl_scene *scene, uint32_t symbol, const char *what, uint64_t limit, pl_error *error)
 {
-    work *w = tracer->work;
-    pl_lazy_cache *cache = tracer->scene->structure;
-    frame f = *as;
-    if (f.depth > PL_LIMIT_DEPTH)
-        return pl_fail_at(query->error, PL_ERROR_LIMIT, tracer->scene->program, symbol,
-                          "depth: a ray came %d symbols deep, which is the limit; does the recursion end?", PL_LIMIT_DEPTH);
-    if (!grow(&w->frames, w->frame_count, &w->frame_capacity, sizeof *w->frames, query->error)) return false;
-    if (!(f.state = pl_lazy_get(cache, w->unfolder, symbol, scope, query->error))) return false;
-    w->frames[w->frame_count++] = f;
-    return push_items(w, (uint32_t)w->frame_count - 1, query, &tracer->counters);
+    return pl_fail_at(error, PL_ERROR_LIMIT, scene->program, symbol == UINT32_MAX ? 0 : symbol,
+                      "work: one ray %s %llu, which is the limit; does the recursion end?", what, (unsigned long long)limit);
 }
 
-/* A position on the stack of frames, and the item at its end. */
-typedef struct source {
-    const work *work;
-    uint32_t frame;
-    const pl_item *item;
-} source;
-
-/* The union terms from the root: the items' terms of the chain of frames, written from the end. */
-static bool write_path(const void *context, pl_path *path)
+/* A packed scope's words, kept behind those of the last frame: they have no draws, so all are equally long. */
+static bool keep_scope(work *w, const uint64_t *scope, size_t *place, pl_error *error)
 {
-    const source *s = context;
-    uint32_t length = s->item->term_count, index = s->frame;
-    for (; s->work->frames[index].item; index = s->work->frames[index].parent)
-        length += s->work->frames[index].item->term_count;
-    if (length && !pl_path_push(path, length - 1, 0)) return false;
-    path->length = length;
-    const pl_item *item = s->item;
-    for (index = s->frame; item; index = s->work->frames[index].parent) {
-        length -= item->term_count;
-        if (item->term_count) memcpy(path->terms + length, item->terms, item->term_count * sizeof *item->terms);
-        item = s->work->frames[index].item;
-    }
+    const size_t words = w->scope_words;
+    *place = w->frame_count * words;
+    if (!scope) return true;
+    if (!grow(&w->scopes, *place + words, &w->scope_capacity, sizeof *w->scopes, error)) return false;
+    memcpy(w->scopes + *place, scope, words * sizeof *scope);
     return true;
 }
 
+/* The state of a frame, unfolded again where it was let go. */
+static const pl_lazy_state *pin(pl_tracer *tracer, frame *f, pl_error *error)
+{
+    work *w = tracer->work;
+    if (!f->state)
+        f->state = pl_lazy_get(tracer->scene->structure, w->unfolder, f->symbol,
+                               f->symbol == UINT32_MAX ? NULL : w->scopes + f->scope, &w->spent, error);
+    return f->state;
+}
+
+/* Goes into an instance whose ray stands in f; terms: of the path to it. */
+static bool enter(pl_tracer *tracer, uint32_t symbol, const uint64_t *scope, const frame *as, pl_query *query)
+{
+    work *w = tracer->work;
+    frame f = *as;
+    if (w->frame_count > PL_LIMIT_DEPTH)
+        return pl_fail_at(query->error, PL_ERROR_LIMIT, tracer->scene->program, symbol,
+                          "depth: a ray came %d symbols deep, which is the limit; does the recursion end?", PL_LIMIT_DEPTH);
+    if (!grow(&w->frames, w->frame_count, &w->frame_capacity, sizeof *w->frames, query->error) ||
+        !keep_scope(w, scope, &f.scope, query->error))
+        return false;
+    f.symbol = symbol;
+    f.state = pl_lazy_get(tracer->scene->structure, w->unfolder, symbol, scope, &w->spent, query->error);
+    if (!f.state) return false;
+    if (w->frame_count >= PINNED) leave(&w->frames[w->frame_count - PINNED]);
+    w->frames[w->frame_count++] = f;
+    if (w->spent > MOST_WORK)
+        return fail_work(tracer->scene, symbol, "needed to visit more nodes of the graph than", MOST_WORK, query->error);
+    return push_items(w, (uint32_t)w->frame_count - 1, query, &tracer->counters);
+}
+
+static bool write_path(const void *context, pl_path *path)
+{
+    const work *w = context;
+    return pl_path_copy(path, &w->path, w->path.length);
+}
+
+/* The path to an item of the last frame. */
+static bool extend_path(work *w, const pl_item *item, pl_error *error)
+{
+    uint32_t length = w->frames[w->frame_count - 1].terms;
+    for (uint32_t i = 0; i < item->term_count; i++)
+        if (!pl_path_push(&w->path, length++, item->terms[i])) return pl_fail_memory(error, "tracing a ray");
+    w->path.length = length;
+    return true;
+}
+
+/* An item of the last frame. */
 static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
 {
     work *w = tracer->work;
-    const frame *parent = &w->frames[at->frame];
-    const pl_lazy_item *it = &parent->state->items[at->item];
+    const pl_scene *scene = tracer->scene;
+    frame *parent = &w->frames[at->frame];
+    const pl_lazy_state *state = pin(tracer, parent, query->error);
+    if (!state) return false;
+    const pl_lazy_item *it = &state->items[at->item];
     const pl_item *item = &it->item;
-    frame f = {.item = item, .parent = at->frame, .depth = parent->depth + 1};
+    frame f = {.state = NULL};
     memcpy(f.o, parent->o, sizeof f.o);
     memcpy(f.d, parent->d, sizeof f.d);
     for (uint32_t i = 0; i < item->transform_count; i++) pl_map_ray(item->transforms[i], f.o, f.d);
-    if (item->kind == PL_NODE_ENTER) return enter(tracer, item->what, it->scope, &f, query);
-    source s = {w, at->frame, item};
-    pl_leaf leaf = {.arguments = item->arguments, .primitive = UINT64_MAX, .path = write_path, .source = &s};
-    if (item->kind == PL_NODE_MESH) leaf.mesh = tracer->scene->meshes[item->what];
+    if (!extend_path(w, item, query->error)) return false;
+    f.terms = w->path.length;
+    if (item->kind == PL_NODE_ENTER) {
+        if (it->unbounded && ++w->unknown > MOST_UNKNOWN)
+            return fail_work(scene, item->what, "entered more instances of unknown size than", MOST_UNKNOWN, query->error);
+        return enter(tracer, item->what, it->scope, &f, query);
+    }
+    pl_leaf leaf = {.arguments = item->arguments, .primitive = UINT64_MAX, .path = write_path, .source = w};
+    if (item->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[item->what];
     else leaf.shape = item->what;
     tracer->counters.primitive_tests++;
     leaf.o = f.o;
@@ -155,10 +214,11 @@ static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
 static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
 {
     work *w = tracer->work;
-    frame root = {.item = NULL};
+    frame root = {.state = NULL};
     memcpy(root.o, ray->origin, sizeof root.o);
     memcpy(root.d, ray->direction, sizeof root.d);
-    w->stack_count = 0;
+    w->stack_count = w->path.length = w->unknown = 0;
+    w->spent = 0;
     bool ok = enter(tracer, UINT32_MAX, NULL, &root, query);
     for (uint64_t steps = 0; ok && w->stack_count && !query->done; steps++) {
         pending at = w->stack[--w->stack_count];
@@ -186,16 +246,19 @@ static bool number(pl_tracer *tracer, pl_hit *hit, pl_error *error)
     pl_walk *walk = &tracer->walk;
     walk->follow = NULL;
     pl_walk_restart(walk, 0, NULL);
-    uint64_t index = 0;
+    uint64_t index = 0, spent = 0;
     for (;;) {
         pl_bounds bounds;
+        if (++spent > MOST_WORK)
+            return fail_work(tracer->scene, walk->node, "to number its primitive needed to visit more nodes than", MOST_WORK,
+                             error);
         switch (pl_walk_next(walk, error)) {
         case PL_EVENT_ERROR: return false;
         case PL_EVENT_END: hit->primitive = UINT64_MAX; return true;
         case PL_EVENT_ENTER:
             if (!is_before(walk, &hit->path)) break;
             pl_classes_bound(pl_lazy_classes(tracer->scene->structure), program->nodes[walk->node].as.enter.symbol,
-                             &walk->scope, &bounds);
+                             &walk->scope, &bounds, &spent);
             if (bounds.count == UINT64_MAX) break;
             index += bounds.count;
             pl_walk_prune(walk);

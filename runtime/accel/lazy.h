@@ -5,7 +5,7 @@
  * classes (class.h), which are conservative without anything below being unfolded. What isn't in use is thrown out by the
  * clock when the budget is used up, and unfolded again when it is needed: a state is a pure function of its key.
  *
- *     pl_lazy_state *state = pl_lazy_get(cache, unfolder, symbol, &scope, error);     pinned
+ *     pl_lazy_state *state = pl_lazy_get(cache, unfolder, symbol, scope, &work, error);     pinned
  *     …
  *     pl_lazy_release(state);
  *
@@ -47,13 +47,14 @@ void pl_lazy_cache_free(pl_lazy_cache *cache);
 pl_unfolder *pl_unfolder_create(const pl_scene *scene, pl_error *error);
 void pl_unfolder_free(pl_unfolder *unfolder);
 
-/* The state that a packed scope leads to at a symbol (UINT32_MAX, NULL: the scene itself), pinned. NULL: an error. */
+/* The state that a packed scope leads to at a symbol (UINT32_MAX, NULL: the scene itself), pinned. NULL: an error. *work grows
+ * by the nodes that were visited to unfold it and to bound what it consists of. */
 pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_unfolder *unfolder, uint32_t symbol, const uint64_t *scope,
-                           pl_error *error);
+                           uint64_t *work, pl_error *error);
 void pl_lazy_release(pl_lazy_state *state);
 
 typedef struct pl_lazy_counts {
-    uint64_t states, bytes, found, unfolded, evicted, classes, classes_emptied;
+    uint64_t states, bytes, found, unfolded, evicted, classes, classes_emptied, classes_visited;
 } pl_lazy_counts;
 void pl_lazy_count(pl_lazy_cache *cache, pl_lazy_counts *counts);
 

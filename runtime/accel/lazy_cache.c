@@ -7,7 +7,10 @@
 #include "../random.h"
 #include "lazy.h"
 
-enum { SHARDS = 64, SHARD_BYTES = 1 << 17, OVERHEAD = 32, SMALLEST_BUDGET = 16384 };
+enum { SHARDS = 64, SHARD_BYTES = 1 << 17, OVERHEAD = 32, SMALLEST_BUDGET = 16384, MOST_LOOKED_AT = 64, BYTES_A_BUCKET = 1024 };
+
+/* Of an event of the derivation, in nodes visited by a walk over a class. */
+enum { EVENT_WORK = 4 };
 
 typedef struct shard {
     pthread_mutex_t lock;
@@ -40,6 +43,7 @@ struct pl_unfolder {
     pl_walk walk;
     pl_scope scope;
     growing drafts, chain, transforms, computed, terms, scopes, key;
+    uint64_t work;
 };
 
 /* A transformation of the current path: constant, or one of `computed`. */
@@ -118,7 +122,7 @@ static void bound(pl_unfolder *u, pl_classes *classes, draft *d)
     pl_bounds bounds;
     const pl_item *item = &d->it.item;
     if (item->kind == PL_NODE_ENTER) {
-        pl_classes_bound(classes, item->what, &u->walk.scope, &bounds);
+        pl_classes_bound(classes, item->what, &u->walk.scope, &bounds, &u->work);
     } else if (item->kind == PL_NODE_MESH) {
         pl_bounds_of_leaf(pl_mesh_box(u->scene->meshes[item->what]), false, &bounds);
     } else {
@@ -170,6 +174,7 @@ static bool derive(pl_unfolder *u, pl_classes *classes, pl_error *error)
     bool ok = true;
     u->drafts.count = u->chain.count = u->transforms.count = u->computed.count = u->terms.count = u->scopes.count = 0;
     while (ok) {
+        u->work += EVENT_WORK;
         switch (pl_walk_next(&u->walk, error)) {
         case PL_EVENT_ERROR: return false;
         case PL_EVENT_END: return true;
@@ -217,7 +222,7 @@ static pl_lazy_state *assemble(pl_unfolder *u, uint32_t symbol, uint64_t hash)
         items[i].item.transforms = list + d->transform_first;
         items[i].item.terms = term_list + d->term_first;
         items[i].scope = words + d->scope_first;
-        pl_reach_join(&state->reach, &d->it.reach);
+        if (!d->it.unbounded) pl_reach_join(&state->reach, &d->it.reach);
     }
     state->hash = hash;
     state->symbol = symbol;
@@ -251,7 +256,7 @@ pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_erro
     cache->shard_count = 1;
     while (cache->shard_count < SHARDS && limit / cache->shard_count > 2 * SHARD_BYTES) cache->shard_count *= 2;
     uint32_t buckets = 16;
-    while (buckets < (1u << 16) && (size_t)buckets * cache->shard_count * 4096 < limit) buckets *= 2;
+    while (buckets < (1u << 16) && (size_t)buckets * cache->shard_count * BYTES_A_BUCKET < limit) buckets *= 2;
     for (uint32_t i = 0; i < cache->shard_count; i++) {
         shard *s = &cache->shards[i];
         pthread_mutex_init(&s->lock, NULL);
@@ -301,14 +306,15 @@ static pl_lazy_state *find(shard *s, uint64_t hash, uint32_t symbol, const uint6
     return NULL;
 }
 
-/* The clock: what wasn't touched since the hand last passed, and isn't pinned, goes. Two rounds at most: then all that is
- * left is in use. */
+/* The clock: what wasn't touched since the hand last passed, and isn't pinned, goes. A bounded number is looked at for each
+ * state that comes, since all may be in use: those on the way to where a ray is, which may be deep. */
 static void evict(shard *s)
 {
-    for (uint32_t steps = 0; s->bytes > s->limit && steps < 2 * s->bucket_count; steps++) {
+    for (uint32_t steps = 0; s->bytes > s->limit && steps < MOST_LOOKED_AT; steps++) {
         pl_lazy_state **place = &s->buckets[s->hand++ & (s->bucket_count - 1)];
         while (*place) {
             pl_lazy_state *state = *place;
+            steps++;
             if (atomic_load(&state->pins) || atomic_exchange(&state->touched, false)) {
                 place = &state->next;
                 continue;
@@ -360,7 +366,7 @@ static bool make_key(pl_unfolder *u, uint32_t symbol)
 }
 
 pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_unfolder *u, uint32_t symbol, const uint64_t *scope,
-                           pl_error *error)
+                           uint64_t *work, pl_error *error)
 {
     if (scope) pl_scope_unpack(cache->scene->program, scope, &u->scope);
     bool ok = make_key(u, symbol);
@@ -374,7 +380,10 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_unfolder *u, uint32_t symbol
         pthread_mutex_unlock(&s->lock);
         if (known) return known;
         pl_walk_restart(&u->walk, symbol == UINT32_MAX ? 0 : symbol, scope ? &u->scope : NULL);
-        if (!derive(u, cache->classes, error)) return NULL;
+        u->work = 0;
+        bool derived = derive(u, cache->classes, error);
+        *work += u->work;
+        if (!derived) return NULL;
         pl_lazy_state *state = assemble(u, symbol, hash);
         if (state) return put(s, state);
     }
@@ -400,5 +409,9 @@ void pl_lazy_count(pl_lazy_cache *cache, pl_lazy_counts *counts)
         counts->evicted += s->evicted;
         pthread_mutex_unlock(&s->lock);
     }
-    pl_classes_count(cache->classes, &counts->classes, &counts->classes_emptied);
+    pl_class_counts classes;
+    pl_classes_count(cache->classes, &classes);
+    counts->classes = classes.classes;
+    counts->classes_emptied = classes.emptied;
+    counts->classes_visited = classes.visited;
 }

@@ -34,9 +34,8 @@ static bool survives(const uint8_t *bytes, size_t length, int accelerator)
         CHECK(error.code != PL_OK && error.reason[0]);
         return false;
     }
-    /* bvh unfolds on touch what doesn't fit the memory; of a recursion without end a ray may touch very much. */
     pl_hits hits = {.t = t, .normal = normal, .depth = depth};
-    bool traced = accelerator == PL_BVH || pl_intersect(scene, 3, origins, directions, &hits, &error);
+    bool traced = pl_intersect(scene, 3, origins, directions, &hits, &error);
     CHECK(traced || (error.code != PL_OK && error.reason[0]));
     pl_scene_destroy(scene);
     return traced;

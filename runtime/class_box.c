@@ -1,0 +1,101 @@
+/* class_box.c - bounds of leaves, of unions and below transformations (class.h). */
+#include "class.h"
+
+pl_bounds pl_bounds_nothing(void)
+{
+    return (pl_bounds){.box = pl_box_empty()};
+}
+
+pl_bounds pl_bounds_unknown(void)
+{
+    return (pl_bounds){pl_box_everything(), {INFINITY, INFINITY, INFINITY}, UINT64_MAX, true};
+}
+
+void pl_bounds_of_leaf(const pl_box *box, bool unbounded, pl_bounds *bounds)
+{
+    bounds->box = *box;
+    bounds->count = 1;
+    bounds->unbounded = unbounded || !(pl_box_is_empty(box) || pl_box_is_finite(box));
+    bounds->reach = pl_reach_leaf(pl_box_is_finite(box) ? 1.7320508075688774 * pl_box_reach(box) : 0.0);
+}
+
+void pl_bounds_join(pl_bounds *a, const pl_bounds *b, bool alternative)
+{
+    pl_box_join(&a->box, &b->box);
+    pl_reach_join(&a->reach, &b->reach);
+    a->unbounded = a->unbounded || b->unbounded;
+    if (alternative) a->count = a->count == b->count ? a->count : UINT64_MAX;
+    else a->count = pl_add_saturating(a->count, b->count);
+}
+
+/* A little wider than rounding of composing and mapping could make a box. */
+void pl_box_widen(pl_box *box)
+{
+    double slack = 64.0 * DBL_EPSILON * pl_box_reach(box);
+    if (pl_box_is_empty(box)) return;
+    for (int axis = 0; axis < 3; axis++) {
+        box->lo[axis] -= slack;
+        box->hi[axis] += slack;
+        if (isnan(box->lo[axis]) || isnan(box->hi[axis])) *box = pl_box_everything();
+    }
+}
+
+/* A box turned again and again grows, though what is in it doesn't: so the distance from the frame's origin is followed as
+ * well (reach.size), which turning leaves alone, and each bounds the other. */
+static void tighten(pl_bounds *bounds)
+{
+    double square = 0.0, size = bounds->reach.size * (1.0 + 1e-12);
+    pl_box *box = &bounds->box;
+    if (pl_box_is_empty(box)) return;
+    for (int axis = 0; axis < 3; axis++) {
+        box->lo[axis] = fmax(box->lo[axis], -size);
+        box->hi[axis] = fmin(box->hi[axis], size);
+        double far = fmax(fabs(box->lo[axis]), fabs(box->hi[axis]));
+        square += far * far;
+    }
+    bounds->reach.size = fmin(bounds->reach.size, sqrt(square) * (1.0 + 1e-12));
+}
+
+void pl_bounds_through(const pl_transform *transform, pl_bounds *bounds)
+{
+    double reach = pl_box_is_empty(&bounds->box) ? 0.0 : pl_box_reach(&bounds->box), move = 0.0;
+    for (int r = 0; r < 3; r++) move = fmax(move, fabs(transform->to_parent.m[4 * r + 3]));
+    bounds->reach = pl_reach_through(transform, &bounds->reach);
+    if (!bounds->unbounded) bounds->box = pl_box_map(&transform->to_parent, &bounds->box);
+    double slack = 16.0 * DBL_EPSILON * (reach * pl_largest_stretch(&transform->to_parent) + move);
+    for (int axis = 0; axis < 3 && !pl_box_is_empty(&bounds->box); axis++) {
+        bounds->box.lo[axis] -= slack;
+        bounds->box.hi[axis] += slack;
+    }
+    pl_box_widen(&bounds->box);
+    if (!pl_box_is_empty(&bounds->box) && !pl_box_is_finite(&bounds->box)) bounds->unbounded = true;
+    if (!bounds->unbounded) tighten(bounds);
+}
+
+void pl_bounds_through_range(const pl_range_map *map, pl_bounds *bounds)
+{
+    const double c = 2.0 * PL_REACH_ROUNDINGS, m = map->stretch, n = map->inverse_stretch;
+    double tau = 0.0;
+    pl_reach below = bounds->reach, *above = &bounds->reach;
+    for (int r = 0; r < 3; r++) tau = hypot(tau, fmax(fabs(map->m[4 * r + 3].lo), fabs(map->m[4 * r + 3].hi)));
+    above->size = m * below.size + tau;
+    above->gain = m * n * (c + below.gain);
+    above->base = m * n * (2.0 * c * (above->size + tau) + below.gain * tau) + m * below.base +
+                  c * (2.0 * m * below.size + tau);
+    if (isnan(above->gain)) above->gain = INFINITY;
+    if (isnan(above->base)) above->base = INFINITY;
+    if (isnan(above->size)) above->size = INFINITY;
+    if (bounds->unbounded || pl_box_is_empty(&bounds->box)) return;
+    pl_box box;
+    for (int r = 0; r < 3; r++) {
+        pl_range sum = map->m[4 * r + 3];
+        for (int k = 0; k < 3; k++)
+            sum = pl_range_add(sum, pl_range_multiply(map->m[4 * r + k], (pl_range){bounds->box.lo[k], bounds->box.hi[k]}));
+        box.lo[r] = sum.lo;
+        box.hi[r] = sum.hi;
+    }
+    bounds->box = box;
+    pl_box_widen(&bounds->box);
+    if (!pl_box_is_finite(&bounds->box)) bounds->unbounded = true;
+    else tighten(bounds);
+}
