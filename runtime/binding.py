@@ -118,6 +118,7 @@ class PlStatistics(ctypes.Structure):
         ("seconds_states", c_double),
         ("isa", c_int),
         ("lazy_found", c_uint64),
+        ("terrain_tiles", c_uint64),
         ("seconds_first_pixel", c_double),
     ]
 

@@ -8,6 +8,7 @@
 
 #include "accel/front.h"
 #include "accel/lazy.h"
+#include "accel/terrain.h"
 #include "cut.h"
 #include "error.h"
 #include "table.h"
@@ -166,6 +167,10 @@ static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
     pl_error ignored = {.code = PL_OK};
     const double asked = scene->options.detail;
     const bool needed = scene->accel->states || asked > 0.0, may_be_lazy = scene->accel == &pl_accel_bvh && !(asked > 0.0);
+    if (may_be_lazy && !scene->options.front_items && pl_terrains_build(scene)) {
+        scene->accel = &pl_accel_terrain;
+        return true;
+    }
     if (!pl_states_build(states, scene->program, scene->meshes, scene->accel->node_boxes, limit,
                          may_be_lazy || !needed ? MOST_STATES : 0, needed && !may_be_lazy ? error : &ignored)) {
         if (may_be_lazy && ignored.code == PL_ERROR_LIMIT && strcmp(ignored.place, "states") == 0) {
@@ -212,6 +217,7 @@ static bool build(pl_scene *scene, pl_error *error)
     counts->bytes_meshes = scene->mesh_bytes;
     counts->bytes_states = scene->states.bytes;
     if (scene->accel == &pl_accel_bvh) pl_fronts_count(scene, counts);
+    if (scene->accel == &pl_accel_terrain) pl_terrains_count(scene, counts);
     counts->scene_bytes = counts->bytes_program + counts->bytes_meshes + counts->bytes_states + counts->bytes_nodes +
                           counts->bytes_items;
     counts->detail = scene->detail;

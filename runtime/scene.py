@@ -306,12 +306,13 @@ class Scene:
 
         Of bvh: isa (None: another accelerator), front {count, items, instances: items that are one, limit: items that one may
         have, None: any number}, instances (entered), filtered (primitives tried in single precision). bytes {program, meshes,
-        states, nodes, items} is scene_bytes by structure; seconds["states"] is a part of seconds["build"].
+        states, nodes, items} is scene_bytes by structure; seconds["states"] is a part of seconds["build"]. terrain {tiles}: where
+        the scene is a regular subdivision, there are neither states nor fronts, and items are tiles of triangles.
         """
         counts = PlStatistics()
         with self._open() as handle:
             library().pl_scene_statistics(handle, ctypes.byref(counts))
-        result: dict = {"rays": {}, "seconds": {}, "cut": {}, "lazy": {}, "front": {}, "bytes": {}}
+        result: dict = {"rays": {}, "seconds": {}, "cut": {}, "lazy": {}, "front": {}, "terrain": {}, "bytes": {}}
         for name, _ in PlStatistics._fields_:
             group, _, member = name.partition("_")
             place = result[group] if group in result else result

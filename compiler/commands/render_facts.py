@@ -42,6 +42,7 @@ def facts(arguments: argparse.Namespace, statistics: dict, seconds: dict[str, fl
         "ended": {"bailout": statistics["bailout"], "trace_level": statistics["trace_level"]},
         "isa": statistics["isa"],
         "front": statistics["front"],
+        "terrain": statistics["terrain"],
         "tests": tests,
         "tests_per_ray": {name: round(count / max(rays, 1), 3) for name, count in tests.items()},
         "seconds": {name: round(value, 6) for name, value in seconds.items()},
@@ -57,7 +58,7 @@ def facts(arguments: argparse.Namespace, statistics: dict, seconds: dict[str, fl
 
 def explanation(statistics: dict, facts: dict) -> list[str]:
     """Lines of ``--explain``: what was built, its bytes and time, and what was left out."""
-    rows = [f"built: {name:<12} {size:>14,} bytes  {text}" for name, size, text in _built(statistics)]
+    rows = [f"built: {name:<13} {size:>14,} bytes  {text}" for name, size, text in _built(statistics)]
     return rows + [f"left out: {row['what']}: {row['why']}" for row in facts["left_out"]]
 
 
@@ -69,6 +70,11 @@ def _built(statistics: dict) -> list[tuple[str, int, str]]:
         rows.append(("meshes", size["meshes"], "boxes over triangles"))
     if size["states"]:
         rows.append(("states", size["states"], f"{statistics['states']} in {seconds['states']:.4f} s"))
+    tiles = statistics["terrain"]["tiles"]
+    if tiles:
+        each = (size["items"] + size["nodes"]) / statistics["primitives"]
+        rows.append(("terrain tiles", size["items"], f"{tiles:,}, of {statistics['primitives']:,} triangles, {each:.1f} bytes each"))
+        rows.append(("terrain nodes", size["nodes"], f"above them, all in {seconds['build']:.4f} s; {statistics['isa']}"))
     if front["count"]:
         limit = "any number" if front["limit"] is None else f"at most {front['limit']:,}"
         build = seconds["build"] - seconds["states"]

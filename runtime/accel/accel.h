@@ -101,7 +101,8 @@ struct pl_accel {
 /* The union terms of items, one after another. false: no memory. */
 bool pl_items_path(const pl_items *items, pl_path *path);
 
-extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh, pl_accel_gated, pl_accel_grid, pl_accel_lazy;
+extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh, pl_accel_gated, pl_accel_grid, pl_accel_lazy,
+    pl_accel_terrain;
 
 /* One step of the normative chain. The arithmetic follows the form of the map, which is a fact of its numbers. */
 static inline void pl_map_ray(const pl_transform *transform, double o[3], double d[3])

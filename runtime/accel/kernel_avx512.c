@@ -5,8 +5,10 @@
 #include "bvh.h"
 
 #define KERNEL pl_bvh_trace_avx512
+#define TERRAIN_KERNEL pl_terrain_trace_avx512
 
 #include "kernel_vector.h"
 
 #include "kernel.h"
+#include "terrain_kernel.h"
 #endif

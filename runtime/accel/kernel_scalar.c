@@ -7,6 +7,7 @@
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 #define KERNEL pl_bvh_trace_scalar
+#define TERRAIN_KERNEL pl_terrain_trace_scalar
 
 #define wide_end() ((void)0)
 #define four_fma(a, b, c) ((a) * (b) + (c))
@@ -29,9 +30,22 @@ static inline wide wide_set(float x)
     return w;
 }
 
+static inline wide wide_bytes(const uint8_t *from)
+{
+    wide w;
+    for (int i = 0; i < 8; i++) w.at[i] = (float)from[i];
+    return w;
+}
+
 static inline wide wide_multiply_subtract(wide a, wide b, wide c)
 {
     for (int i = 0; i < 8; i++) a.at[i] = a.at[i] * b.at[i] - c.at[i];
+    return a;
+}
+
+static inline wide wide_multiply_add(wide a, wide b, wide c)
+{
+    for (int i = 0; i < 8; i++) a.at[i] = a.at[i] * b.at[i] + c.at[i];
     return a;
 }
 
@@ -66,3 +80,4 @@ static inline unsigned wide_order(wide enter, wide leave, const pl_ref *child, u
 }
 
 #include "kernel.h"
+#include "terrain_kernel.h"

@@ -4,8 +4,10 @@
 typedef __m256 wide;
 
 #define wide_load(from) _mm256_loadu_ps(from)
+#define wide_bytes(from) _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(from))))
 #define wide_set(x) _mm256_set1_ps(x)
 #define wide_multiply_subtract(a, b, c) _mm256_fmsub_ps(a, b, c)
+#define wide_multiply_add(a, b, c) _mm256_fmadd_ps(a, b, c)
 #define wide_max(a, b) _mm256_max_ps(a, b) /* the second where the first is NaN */
 #define wide_min(a, b) _mm256_min_ps(a, b)
 #define four_fma(a, b, c) ((double4)_mm256_fmadd_pd((__m256d)(a), _mm256_set1_pd(b), (__m256d)(c)))

@@ -144,6 +144,7 @@ typedef struct pl_statistics {
     double seconds_states; /* of seconds_build */
     int isa;               /* pl_isa of bvh's kernel; 0: another accelerator */
     uint64_t lazy_found;   /* times that a ray came to a state that was in memory already */
+    uint64_t terrain_tiles; /* of regular subdivisions; their bytes are nodes and items */
     double seconds_first_pixel; /* from the last rendering's start to its first pixel's colour; 0: nothing rendered */
 } pl_statistics;
 

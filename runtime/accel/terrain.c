@@ -1,0 +1,170 @@
+/* terrain.c - the accelerator of scenes that are regular subdivisions (terrain.h): rays through the tiles, triangles
+ * evaluated from the tiles' values in double. */
+#include "terrain.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "bvh.h"
+
+/* --- hits --- */
+
+/* A triangle's place: its number tells the terms. */
+typedef struct source {
+    const pl_terrain *terrain;
+    uint64_t leaf;
+} source;
+
+static bool write_terms(const pl_terrain_place *place, uint32_t more, pl_path *path)
+{
+    const uint32_t length = place->term_count + more;
+    if (length && !pl_path_push(path, length - 1, 0)) return false;
+    if (place->term_count) memcpy(path->terms, place->terms, place->term_count * sizeof *path->terms);
+    path->length = length;
+    return true;
+}
+
+static bool triangle_path(const void *context, pl_path *path)
+{
+    const source *s = context;
+    const pl_terrain *terrain = s->terrain;
+    if (!write_terms(&terrain->place, terrain->levels, path)) return false;
+    uint32_t *terms = path->terms + terrain->place.term_count;
+    uint32_t rest = (uint32_t)s->leaf;
+    for (uint32_t i = terrain->levels; i-- > 0;) {
+        terms[i] = terrain->shift[i] ? rest & (terrain->radix[i] - 1) : rest % terrain->radix[i];
+        rest = terrain->shift[i] ? rest >> terrain->shift[i] : rest / terrain->radix[i];
+    }
+    return true;
+}
+
+bool pl_terrain_candidate(pl_tracer *tracer, const pl_terrain *terrain, uint64_t tile, uint32_t leaf, const double o[3],
+                          const double d[3], pl_query *query)
+{
+    static const double no_arguments[PL_SHAPE_ARGUMENTS];
+    double cells[PL_TERRAIN_CELLS], numbers[12], mapped_o[3], mapped_d[3];
+    pl_affine step, identity = pl_affine_identity();
+    pl_transform transform;
+    pl_terrain_cells(terrain, pl_terrain_tile_at(terrain, tile)->values, leaf, cells);
+    pl_terrain_matrix(&terrain->form, cells, numbers);
+    for (int i = 0; i < 12; i++) step.m[4 * (i % 3) + i / 3] = numbers[i];
+    step = pl_affine_multiply(&identity, &step);
+    pl_transform_set(&transform, &step);
+    memcpy(mapped_o, o, sizeof mapped_o);
+    memcpy(mapped_d, d, sizeof mapped_d);
+    pl_map_ray(&transform, mapped_o, mapped_d);
+    source s = {terrain, tile * terrain->tile_leaves + leaf};
+    pl_leaf candidate = {.shape = PL_SHAPE_TRIANGLE,
+                         .arguments = no_arguments,
+                         .primitive = terrain->place.first + s.leaf,
+                         .path = triangle_path,
+                         .source = &s,
+                         .o = mapped_o,
+                         .d = mapped_d};
+    tracer->counters.primitive_tests++;
+    return pl_query_leaf(query, &candidate);
+}
+
+static bool single_path(const void *context, pl_path *path)
+{
+    return write_terms(context, 0, path);
+}
+
+static void map_to_place(const pl_terrain_place *place, const pl_ray *ray, double o[3], double d[3])
+{
+    memcpy(o, ray->origin, 3 * sizeof *o);
+    memcpy(d, ray->direction, 3 * sizeof *d);
+    for (uint32_t i = 0; i < place->transform_count; i++) pl_map_ray(&place->transforms[i], o, d);
+}
+
+static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
+{
+    const pl_terrains *terrains = tracer->scene->structure;
+    pl_terrain_kernel *kernel = pl_terrain_trace_scalar;
+    double o[3], d[3];
+#ifdef __x86_64__
+    if (tracer->scene->isa == PL_ISA_AVX2) kernel = pl_terrain_trace_avx2;
+    if (tracer->scene->isa == PL_ISA_AVX512) kernel = pl_terrain_trace_avx512;
+#endif
+    for (uint32_t i = 0; i < terrains->single_count && !query->done; i++) {
+        const pl_terrain_single *single = &terrains->singles[i];
+        if (query->shadow && single->place.no_shadow) continue;
+        map_to_place(&single->place, ray, o, d);
+        pl_leaf leaf = {.shape = single->shape,
+                        .mesh = single->mesh,
+                        .arguments = single->arguments,
+                        .primitive = single->place.first,
+                        .path = single_path,
+                        .source = &single->place,
+                        .o = o,
+                        .d = d};
+        tracer->counters.primitive_tests++;
+        if (!pl_query_leaf(query, &leaf)) return false;
+    }
+    for (uint32_t i = 0; i < terrains->count && !query->done; i++) {
+        const pl_terrain *terrain = &terrains->list[i];
+        if (query->shadow && terrain->place.no_shadow) continue;
+        map_to_place(&terrain->place, ray, o, d);
+        if (!kernel(tracer, terrain, o, d, query)) return false;
+    }
+    return true;
+}
+
+/* --- memory --- */
+
+static void *work_create(const pl_scene *scene, pl_error *error)
+{
+    return pl_accel_bvh.work_create(scene, error);
+}
+
+static void work_destroy(void *work)
+{
+    pl_accel_bvh.work_destroy(work);
+}
+
+static void free_place(pl_terrain_place *place)
+{
+    free(place->transforms);
+    free(place->terms);
+}
+
+void pl_terrains_free(pl_terrains *terrains)
+{
+    if (!terrains) return;
+    for (uint32_t i = 0; terrains->list && i < terrains->count; i++) {
+        pl_terrain *terrain = &terrains->list[i];
+        free_place(&terrain->place);
+        free(terrain->scope);
+        free(terrain->classes);
+        free(terrain->memory);
+        free((void *)terrain->front.nodes);
+    }
+    for (uint32_t i = 0; terrains->singles && i < terrains->single_count; i++) free_place(&terrains->singles[i].place);
+    free(terrains->list);
+    free(terrains->singles);
+    free(terrains);
+}
+
+static void destroy(pl_scene *scene)
+{
+    pl_terrains_free(scene->structure);
+    scene->structure = NULL;
+}
+
+void pl_terrains_count(const pl_scene *scene, pl_statistics *counts)
+{
+    const pl_terrains *terrains = scene->structure;
+    counts->primitives = terrains->generated;
+    counts->depth = 0;
+    for (uint32_t i = 0; i < terrains->count; i++) {
+        const pl_terrain *terrain = &terrains->list[i];
+        counts->depth = terrain->depth > counts->depth ? terrain->depth : counts->depth;
+        counts->bytes_nodes += terrain->node_bytes;
+        counts->terrain_tiles += terrain->tiles;
+    }
+    counts->bytes_items = terrains->bytes - counts->bytes_nodes;
+    counts->isa = scene->isa;
+}
+
+const pl_accel pl_accel_terrain = {
+    .name = "bvh", .destroy = destroy, .work_create = work_create, .work_destroy = work_destroy, .trace = trace};

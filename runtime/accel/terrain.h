@@ -1,0 +1,155 @@
+/* terrain.h - regular subdivisions: landscapes whose triangles cost bytes.
+ *
+ * A patch that becomes k patches, level after level, all different, ends in N = k^n triangles that share next to nothing
+ * as states. What they share is their shape: the subdivision is a complete tree, so a triangle's number tells its path, and
+ * each triangle's matrix is made of the same few parameters (`matrix xb - xa, …`), whose values recur in its neighbours.
+ *
+ *     tile     a subtree of at most 64 triangles: a table of the distinct values of their parameters, in double
+ *     classes  one for all tiles: which value of the table is which triangle's which parameter
+ *     cluster  eight triangles that follow one another; a tile has their boxes in 8 bits a plane
+ *     front    a tree of boxes over the tiles, as front.h has it
+ *
+ * A matrix made from a tile's values has the bits that the derivation gives it: every triangle was compared when the tiles
+ * were filled. So hits are normative and nothing is derived while tracing.
+ *
+ *     terrain_find.c  scene -> terrains, or none      terrain_fill.c  terrain -> tiles      terrain.c  rays -> hits
+ *     terrain_kernel.h  the traversal, for an instruction set each
+ *
+ * Example: 2,097,152 triangles with heights of their own and shared edges take 10.6 bytes each, tree included. */
+#ifndef PL_TERRAIN_H
+#define PL_TERRAIN_H
+
+#include "front.h"
+
+enum {
+    PL_TERRAIN_CELLS = 25, /* a number or parameter each: 12 differences have two at most, and there is 0 */
+    PL_TERRAIN_TILE = 64,
+    PL_TERRAIN_CLUSTER = 8,
+    PL_TERRAIN_CLUSTERS = PL_TERRAIN_TILE / PL_TERRAIN_CLUSTER,
+    PL_TERRAIN_LEVELS = 40,
+    PL_TERRAIN_MOST = 1 << 28, /* triangles */
+    /* Kinds of references in a terrain's tree. */
+    PL_KIND_TILE = 1,
+    PL_KIND_CLUSTER = 2
+};
+
+/* The triangles' transformation: number i of its matrix is cell plus[i] - cell minus[i]. */
+typedef struct pl_terrain_form {
+    uint32_t node;         /* transform_code */
+    uint32_t slots, cells; /* the first `slots` cells are parameters, the others numbers */
+    uint32_t slot[PL_TERRAIN_CELLS];
+    double number[PL_TERRAIN_CELLS];
+    uint8_t plus[12], minus[12];
+} pl_terrain_form;
+
+/* Boxes in the unit frame: plane q lies at lo + q * step. Rows are those of pl_front_node. */
+typedef struct pl_terrain_tile {
+    float lo[3], step[3];
+    uint8_t planes[6][PL_TERRAIN_CLUSTERS];
+    double values[];
+} pl_terrain_tile;
+
+/* What the scene has at its root: a shape or mesh of its own, or a terrain. */
+typedef struct pl_terrain_place {
+    pl_transform *transforms; /* outermost first */
+    uint32_t *terms;          /* from the root */
+    uint32_t transform_count, term_count;
+    bool no_shadow;
+    uint64_t first; /* the number of its first primitive */
+} pl_terrain_place;
+
+typedef struct pl_terrain {
+    pl_terrain_place place;
+    uint32_t symbol;
+    uint64_t *scope; /* packed, on the way into the symbol */
+    uint32_t levels, radix[PL_TERRAIN_LEVELS]; /* terms of each union on the way down */
+    uint8_t shift[PL_TERRAIN_LEVELS];          /* radix = 2^shift; 0: it is none */
+    uint32_t depth;      /* symbols entered, its own included */
+    uint64_t leaves;
+    uint32_t tile_level; /* unions above a tile */
+    uint32_t tile_leaves;
+    uint64_t tiles;
+    pl_terrain_form form;
+    uint16_t *classes;   /* [cell][tile_row]: which value is the parameter */
+    uint32_t tile_row;   /* tile_leaves, filled up to whole clusters */
+    uint32_t values;     /* of a tile */
+    size_t stride;       /* bytes of a tile */
+    unsigned char *memory;
+    double edge;         /* no triangle's edge is longer */
+    pl_front front;      /* its tree's leaves are tiles */
+    size_t node_bytes;
+} pl_terrain;
+
+typedef struct pl_terrain_single {
+    pl_terrain_place place;
+    uint32_t shape;
+    const pl_mesh_tree *mesh; /* NULL: a shape */
+    double arguments[PL_SHAPE_ARGUMENTS];
+} pl_terrain_single;
+
+typedef struct pl_terrains {
+    pl_terrain *list;
+    pl_terrain_single *singles;
+    uint32_t count, single_count;
+    uint64_t generated;
+    size_t bytes;
+} pl_terrains;
+
+static inline const pl_terrain_tile *pl_terrain_tile_at(const pl_terrain *terrain, uint64_t tile)
+{
+    return (const pl_terrain_tile *)(terrain->memory + tile * terrain->stride);
+}
+
+/* The 12 numbers of a triangle's matrix operation from its cells. */
+static inline void pl_terrain_matrix(const pl_terrain_form *form, const double *cells, double numbers[12])
+{
+    for (int i = 0; i < 12; i++) numbers[i] = cells[form->plus[i]] - cells[form->minus[i]];
+}
+
+/* The cells of a triangle of a tile. */
+static inline void pl_terrain_cells(const pl_terrain *terrain, const double *values, uint32_t leaf, double *cells)
+{
+    const pl_terrain_form *form = &terrain->form;
+    for (uint32_t c = 0; c < form->slots; c++) cells[c] = values[terrain->classes[c * terrain->tile_row + leaf]];
+    for (uint32_t c = form->slots; c < form->cells; c++) cells[c] = form->number[c];
+}
+
+/* --- terrain_find.c --- */
+
+/* A thread's working memory to derive parts of a terrain. */
+typedef struct pl_terrain_walk {
+    pl_walk walk;
+    pl_scope scope;
+    pl_path path;
+} pl_terrain_walk;
+bool pl_terrain_walk_begin(pl_terrain_walk *w, const pl_program *program);
+void pl_terrain_walk_end(pl_terrain_walk *w);
+
+/* Derives the triangles below union `index` of a level, in order; false: the derivation departs from the terrain's shape, or take
+ * returned false. */
+typedef bool pl_terrain_take(void *context, uint64_t leaf, const double *cells, const pl_transform *transform);
+bool pl_terrain_derive(const pl_terrain *terrain, pl_terrain_walk *w, uint32_t level, uint64_t index,
+                       pl_terrain_take *take, void *context);
+
+/* Whether the scene is terrains and a few single shapes, which pay; then it has scene->structure. */
+bool pl_terrains_build(pl_scene *scene);
+
+/* --- terrain_fill.c --- */
+
+/* Derives a terrain into tiles, in at most `limit` bytes. false: it isn't one, or doesn't pay, or doesn't fit. */
+bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit);
+
+/* --- terrain.c --- */
+
+void pl_terrains_free(pl_terrains *terrains);
+void pl_terrains_count(const pl_scene *scene, pl_statistics *counts);
+
+typedef bool pl_terrain_kernel(pl_tracer *tracer, const pl_terrain *terrain, const double o[3], const double d[3],
+                               pl_query *query);
+extern pl_terrain_kernel pl_terrain_trace_scalar, pl_terrain_trace_avx2, pl_terrain_trace_avx512;
+
+/* Evaluates a triangle normatively and offers it; o, d: the ray in the terrain's frame. false: an error. */
+bool pl_terrain_candidate(pl_tracer *tracer, const pl_terrain *terrain, uint64_t tile, uint32_t leaf, const double o[3],
+                          const double d[3], pl_query *query);
+
+#endif

@@ -1,0 +1,410 @@
+/* terrain_fill.c - a terrain's tiles (terrain.h): which values they share, their values, their boxes, and the tree above.
+ *
+ * Which parameters of a tile are one value is learnt from tiles spread over the terrain: two are, if they are equal, bit by
+ * bit, in every one of these. All tiles are then filled and compared with that, subtree by subtree among the threads; if one
+ * differs, more are learnt from. So the classes depend on the scene alone. */
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "../random.h"
+#include "terrain.h"
+
+enum { FIRST_SAMPLES = 256, MORE_SAMPLES = 16, TASKS = 64, MOST_THREADS = 64, ROOM = PL_TERRAIN_TILE * PL_TERRAIN_CELLS };
+
+/* --- which values are the same --- */
+
+/* A tile's parameters: cells[leaf][cell] in one row. */
+typedef struct sheet {
+    uint32_t count, width;
+    double cells[ROOM];
+} sheet;
+
+static bool take_cells(void *context, uint64_t leaf, const double *cells, const pl_transform *transform)
+{
+    sheet *s = context;
+    (void)leaf, (void)transform;
+    memcpy(s->cells + s->count, cells, s->width * sizeof *cells);
+    s->count += s->width;
+    return true;
+}
+
+static bool derive_sheet(const pl_terrain *terrain, pl_terrain_walk *w, uint64_t tile, sheet *s)
+{
+    s->count = 0;
+    s->width = terrain->form.slots;
+    return pl_terrain_derive(terrain, w, terrain->tile_level, tile, take_cells, s);
+}
+
+typedef struct cell {
+    uint32_t class, place;
+    uint64_t bits;
+} cell;
+
+static int compare_cells(const void *a, const void *b)
+{
+    const cell *x = a, *y = b;
+    if (x->class != y->class) return x->class < y->class ? -1 : 1;
+    if (x->bits != y->bits) return x->bits < y->bits ? -1 : 1;
+    return (x->place > y->place) - (x->place < y->place);
+}
+
+/* Bits as they are: -0 isn't 0. */
+static uint64_t exact_bits(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+
+/* Divides classes whose members differ in this tile; returns their number. */
+static uint32_t refine(uint32_t *classes, const sheet *s)
+{
+    static _Thread_local cell cells[ROOM];
+    uint32_t number = 0;
+    for (uint32_t i = 0; i < s->count; i++) cells[i] = (cell){classes[i], i, exact_bits(s->cells[i])};
+    qsort(cells, s->count, sizeof *cells, compare_cells);
+    for (uint32_t i = 0; i < s->count; i++) {
+        bool same = i && cells[i].class == cells[i - 1].class && cells[i].bits == cells[i - 1].bits;
+        number += !same;
+        classes[cells[i].place] = number - 1;
+    }
+    return number;
+}
+
+static int compare_hashes(const void *a, const void *b)
+{
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Tiles that recur are states that recur: fronts hold each of them once. */
+static bool are_different(uint64_t *hashes, uint64_t count)
+{
+    qsort(hashes, count, sizeof *hashes, compare_hashes);
+    for (uint64_t i = 1; i < count; i++)
+        if (hashes[i] == hashes[i - 1]) return false;
+    return true;
+}
+
+/* classes by cell, as the kernels read them, from those of a sheet's places. */
+static void set_classes(pl_terrain *terrain, const uint32_t *found)
+{
+    const pl_terrain_form *form = &terrain->form;
+    uint16_t renamed[ROOM];
+    memset(renamed, 0xFF, sizeof renamed);
+    terrain->values = 0;
+    for (uint32_t leaf = 0; leaf < terrain->tile_row; leaf++) {
+        uint32_t real = leaf < terrain->tile_leaves ? leaf : terrain->tile_leaves - 1;
+        for (uint32_t c = 0; c < form->slots; c++) {
+            uint16_t *name = &renamed[found[real * form->slots + c]];
+            if (*name == UINT16_MAX) *name = (uint16_t)terrain->values++;
+            terrain->classes[c * terrain->tile_row + leaf] = *name;
+        }
+    }
+    terrain->stride = sizeof(pl_terrain_tile) + terrain->values * sizeof(double);
+}
+
+/* Learns the classes from `samples` tiles. */
+static bool learn(pl_terrain *terrain, pl_terrain_walk *w, uint64_t samples)
+{
+    sheet *s = malloc(sizeof *s);
+    uint64_t *hashes = malloc(samples * sizeof *hashes);
+    uint32_t *found = malloc(ROOM * sizeof *found);
+    bool ok = s && hashes && found;
+    if (ok) memset(found, 0, ROOM * sizeof *found);
+    for (uint64_t i = 0; ok && i < samples; i++) {
+        if (!(ok = derive_sheet(terrain, w, i * (terrain->tiles - 1) / (samples - 1), s))) break;
+        refine(found, s);
+        hashes[i] = 0;
+        for (uint32_t k = 0; k < s->count; k++) hashes[i] = pl_mix(hashes[i], exact_bits(s->cells[k]));
+    }
+    ok = ok && are_different(hashes, samples);
+    if (ok) set_classes(terrain, found);
+    free(s);
+    free(hashes);
+    free(found);
+    return ok;
+}
+
+/* --- filling --- */
+
+/* Upper bounds over all triangles, of which reach.h makes one for the terrain. */
+typedef struct bounds {
+    pl_box box;
+    double stretch, inverse_stretch, move, lack, edge;
+} bounds;
+
+typedef struct filler {
+    pl_terrain *terrain;
+    pl_terrain_walk walk;
+    bounds bounds;
+    bool set[ROOM];
+    bool same;
+} filler;
+
+static double length3(double x, double y, double z)
+{
+    return sqrt(x * x + y * y + z * z);
+}
+
+/* No singular value is larger. */
+static double frobenius(const double *m)
+{
+    double sum = 0.0;
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++) sum += m[4 * r + c] * m[4 * r + c];
+    return sqrt(sum) * (1.0 + 64.0 * DBL_EPSILON);
+}
+
+static void bound_triangle(bounds *b, const pl_transform *transform)
+{
+    const double *m = transform->to_parent.m;
+    pl_affine product = pl_affine_multiply(&transform->to_parent, &transform->to_object);
+    double lack = 0.0;
+    for (int i = 0; i < 12; i++) lack = fmax(lack, fabs(product.m[i] - (i % 5 == 0 ? 1.0 : 0.0)));
+    b->lack = fmax(b->lack, lack);
+    b->stretch = fmax(b->stretch, frobenius(m));
+    b->inverse_stretch = fmax(b->inverse_stretch, frobenius(transform->to_object.m));
+    b->move = fmax(b->move, length3(m[3], m[7], m[11]));
+    b->edge = fmax(b->edge, fmax(length3(m[0], m[4], m[8]), length3(m[1], m[5], m[9])));
+    for (int axis = 0; axis < 3; axis++) {
+        double at = m[4 * axis + 3], x = m[4 * axis], y = m[4 * axis + 1];
+        b->box.lo[axis] = fmin(b->box.lo[axis], at + fmin(0.0, fmin(x, y)));
+        b->box.hi[axis] = fmax(b->box.hi[axis], at + fmax(0.0, fmax(x, y)));
+    }
+}
+
+static void join_bounds(bounds *a, const bounds *b)
+{
+    pl_box_join(&a->box, &b->box);
+    a->stretch = fmax(a->stretch, b->stretch);
+    a->inverse_stretch = fmax(a->inverse_stretch, b->inverse_stretch);
+    a->move = fmax(a->move, b->move);
+    a->lack = fmax(a->lack, b->lack);
+    a->edge = fmax(a->edge, b->edge);
+}
+
+/* Puts a triangle's values in their places; whoever comes second has to bring the same. */
+static bool take_leaf(void *context, uint64_t leaf, const double *cells, const pl_transform *transform)
+{
+    filler *f = context;
+    const pl_terrain *t = f->terrain;
+    const uint32_t in_tile = (uint32_t)(leaf % t->tile_leaves);
+    double *values = (double *)pl_terrain_tile_at(t, leaf / t->tile_leaves)->values;
+    if (in_tile == 0) memset(f->set, 0, t->values * sizeof *f->set);
+    for (uint32_t c = 0; c < t->form.slots; c++) {
+        uint32_t class = t->classes[c * t->tile_row + in_tile];
+        if (!f->set[class]) values[class] = cells[c];
+        else if (exact_bits(values[class]) != exact_bits(cells[c])) f->same = false;
+        f->set[class] = true;
+    }
+    bound_triangle(&f->bounds, transform);
+    return f->same;
+}
+
+typedef struct job {
+    pl_terrain *terrain;
+    const pl_program *program;
+    uint32_t level; /* subtrees of it are the tasks */
+    uint64_t tasks;
+    atomic_ullong next;
+    atomic_bool departs, differs; /* the derivation from the shape; a tile from the classes */
+    pthread_mutex_t lock;
+    bounds bounds;
+} job;
+
+static void *work(void *context)
+{
+    job *j = context;
+    filler *f = malloc(sizeof *f);
+    bool ready = f && pl_terrain_walk_begin(&f->walk, j->program);
+    if (!ready) atomic_store(&j->departs, true);
+    if (f) {
+        f->terrain = j->terrain;
+        f->bounds = (bounds){.box = pl_box_empty()};
+    }
+    while (ready && !atomic_load(&j->departs) && !atomic_load(&j->differs)) {
+        uint64_t task = atomic_fetch_add(&j->next, 1);
+        if (task >= j->tasks) break;
+        f->same = true;
+        if (!pl_terrain_derive(j->terrain, &f->walk, j->level, task, take_leaf, f))
+            atomic_store(f->same ? &j->departs : &j->differs, true);
+    }
+    if (ready) {
+        pthread_mutex_lock(&j->lock);
+        join_bounds(&j->bounds, &f->bounds);
+        pthread_mutex_unlock(&j->lock);
+    }
+    if (f) pl_terrain_walk_end(&f->walk);
+    free(f);
+    return NULL;
+}
+
+/* Derives the whole terrain into its tiles. */
+static void fill(const pl_scene *scene, job *j)
+{
+    pl_terrain *terrain = j->terrain;
+    pthread_t threads[MOST_THREADS];
+    int others = 0;
+    j->program = scene->program;
+    j->bounds = (bounds){.box = pl_box_empty()};
+    j->tasks = 1;
+    while (j->tasks < TASKS && j->level < terrain->tile_level) j->tasks *= terrain->radix[j->level++];
+    pthread_mutex_init(&j->lock, NULL);
+    while (others < scene->threads - 1 && others < MOST_THREADS &&
+           pthread_create(&threads[others], NULL, work, j) == 0)
+        others++;
+    work(j);
+    for (int i = 0; i < others; i++) pthread_join(threads[i], NULL);
+    pthread_mutex_destroy(&j->lock);
+}
+
+/* --- boxes --- */
+
+static float round_down(double x)
+{
+    float f = (float)x;
+    return (double)f > x ? nextafterf(f, -INFINITY) : f;
+}
+
+static float round_up(double x)
+{
+    float f = (float)x;
+    return (double)f < x ? nextafterf(f, INFINITY) : f;
+}
+
+/* Quantises outward, by what the kernels make of it: lo + q * step. */
+static uint8_t plane_below(float lo, float step, float x)
+{
+    int q = step > 0.0f ? (int)((x - lo) / step) : 0;
+    q = q < 0 ? 0 : q > 255 ? 255 : q;
+    while (q > 0 && lo + (float)q * step > x) q--;
+    return (uint8_t)q;
+}
+
+static uint8_t plane_above(float lo, float step, float x)
+{
+    int q = step > 0.0f ? (int)((x - lo) / step) : 0;
+    q = q < 0 ? 0 : q > 255 ? 255 : q;
+    while (q < 255 && lo + (float)q * step < x) q++;
+    return (uint8_t)q;
+}
+
+/* The boxes of a tile's clusters in the unit frame, from its values. */
+static uint32_t cluster_boxes(const pl_terrain *terrain, const pl_terrain_tile *tile, pl_boxed *clusters)
+{
+    const uint32_t count = terrain->tile_row / PL_TERRAIN_CLUSTER;
+    for (uint32_t i = 0; i < count; i++)
+        for (int axis = 0; axis < 3; axis++) {
+            clusters[i].lo[axis] = INFINITY;
+            clusters[i].hi[axis] = -INFINITY;
+        }
+    for (uint32_t leaf = 0; leaf < terrain->tile_leaves; leaf++) {
+        double cells[PL_TERRAIN_CELLS], m[12];
+        pl_boxed *box = &clusters[leaf / PL_TERRAIN_CLUSTER];
+        pl_terrain_cells(terrain, tile->values, leaf, cells);
+        pl_terrain_matrix(&terrain->form, cells, m);
+        for (int axis = 0; axis < 3; axis++) {
+            double at = m[9 + axis], x = m[axis], y = m[3 + axis];
+            double lo = (at + fmin(0.0, fmin(x, y)) - terrain->front.centre[axis]) * terrain->front.scale;
+            double hi = (at + fmax(0.0, fmax(x, y)) - terrain->front.centre[axis]) * terrain->front.scale;
+            box->lo[axis] = fminf(box->lo[axis], round_down(lo));
+            box->hi[axis] = fmaxf(box->hi[axis], round_up(hi));
+        }
+    }
+    return count;
+}
+
+static void set_tile(const pl_terrain *terrain, uint64_t index, pl_boxed *box)
+{
+    pl_terrain_tile *tile = (pl_terrain_tile *)pl_terrain_tile_at(terrain, index);
+    pl_boxed clusters[PL_TERRAIN_CLUSTERS];
+    const uint32_t count = cluster_boxes(terrain, tile, clusters);
+    box->ref = pl_ref_of(PL_KIND_TILE, (uint32_t)index);
+    memset(tile->planes, 0, sizeof tile->planes);
+    for (int axis = 0; axis < 3; axis++) {
+        float lo = INFINITY, hi = -INFINITY;
+        for (uint32_t i = 0; i < count; i++) {
+            lo = fminf(lo, clusters[i].lo[axis]);
+            hi = fmaxf(hi, clusters[i].hi[axis]);
+        }
+        float step = (hi - lo) / 255.0f;
+        while (lo + 255.0f * step < hi) step = nextafterf(step, INFINITY);
+        tile->lo[axis] = lo;
+        tile->step[axis] = step;
+        box->lo[axis] = lo;
+        box->hi[axis] = hi;
+        for (uint32_t i = 0; i < count; i++) {
+            tile->planes[axis][i] = plane_below(lo, step, clusters[i].lo[axis]);
+            tile->planes[3 + axis][i] = plane_above(lo, step, clusters[i].hi[axis]);
+        }
+    }
+}
+
+/* pl_reach_through for all triangles at once: it rises with each of its arguments. */
+static pl_reach reach_of(const bounds *b)
+{
+    const pl_reach leaf = pl_reach_leaf(1.4142135623730952);
+    const double c = PL_REACH_ROUNDINGS, m = b->stretch, n = b->inverse_stretch, tau = b->move;
+    pl_reach above = {.size = m * leaf.size + tau};
+    above.gain = m * n * (c + leaf.gain) + 3.0 * b->lack / DBL_EPSILON;
+    above.base = m * n * (c * (above.size + tau) + leaf.gain * tau) + m * leaf.base + c * (2.0 * m * leaf.size + tau) +
+                 (3.0 * b->lack * above.size + 2.0 * b->lack) / DBL_EPSILON;
+    return above;
+}
+
+static bool set_frame(pl_terrain *terrain, const bounds *b)
+{
+    pl_state state = {.box = b->box, .reach = reach_of(b)};
+    const pl_states states = {.list = &state};
+    terrain->edge = b->edge;
+    pl_front_set_frame(&terrain->front, &states, 0);
+    return terrain->front.framed && isfinite(state.reach.base) && terrain->front.scale < 1e300;
+}
+
+static bool build_tree(pl_terrain *terrain, int threads)
+{
+    pl_boxed *boxes = malloc(terrain->tiles * sizeof *boxes);
+    size_t most = pl_front_most_nodes(terrain->tiles) * sizeof(pl_front_node);
+    pl_front_node *nodes = aligned_alloc(64, (most + 63) & ~(size_t)63), *kept = NULL;
+    if (boxes && nodes) {
+        for (uint64_t i = 0; i < terrain->tiles; i++) set_tile(terrain, i, &boxes[i]);
+        uint32_t count = pl_front_tree(boxes, terrain->tiles, nodes, &terrain->front.root, threads);
+        terrain->node_bytes = (count * sizeof *nodes + 63) & ~(size_t)63;
+        kept = aligned_alloc(64, terrain->node_bytes);
+        if (kept) memcpy(kept, nodes, count * sizeof *nodes);
+        terrain->front.nodes = kept;
+    }
+    free(boxes);
+    free(nodes);
+    return kept != NULL;
+}
+
+bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit)
+{
+    pl_terrain_walk w;
+    uint64_t samples = terrain->tiles < FIRST_SAMPLES ? terrain->tiles : FIRST_SAMPLES;
+    bool ok = pl_terrain_walk_begin(&w, scene->program), done = false;
+    terrain->classes = calloc(terrain->form.slots * terrain->tile_row, sizeof *terrain->classes);
+    ok = ok && terrain->classes;
+    while (ok && !done) {
+        ok = learn(terrain, &w, samples);
+        /* The tree: its boxes while it is built, and nodes that have five children or more. */
+        size_t a_tile = terrain->stride + sizeof(pl_boxed) + 2 * sizeof(pl_front_node) / 4;
+        free(terrain->memory);
+        terrain->memory = NULL;
+        if (!ok || terrain->tiles > PL_REF_INDEX / PL_TERRAIN_CLUSTERS || terrain->tiles > limit / a_tile ||
+            !(terrain->memory = malloc(terrain->tiles * terrain->stride)))
+            ok = false;
+        job j = {.terrain = terrain};
+        if (ok) fill(scene, &j);
+        ok = ok && !atomic_load(&j.departs);
+        done = ok && !atomic_load(&j.differs);
+        if (done) ok = set_frame(terrain, &j.bounds) && build_tree(terrain, scene->threads);
+        samples = samples > terrain->tiles / MORE_SAMPLES ? terrain->tiles : samples * MORE_SAMPLES;
+    }
+    pl_terrain_walk_end(&w);
+    return ok;
+}
