@@ -20,7 +20,7 @@ from plsys.compiler.reading.source import Source
 SCENES = sorted(Path("scenes").glob("*.plsys"))
 NAMES = {
     "tree", "tree3d", "menger", "sierpinski", "koch", "fern", "bush", "flower", "palm", "conifer", "tower", "shading",
-    "mirrors",
+    "mirrors", "terrain",
 }  # fmt: skip
 
 

@@ -1,0 +1,163 @@
+"""Regular subdivisions: triangles that cost bytes give the bits that the derivation gives, and what is no regular
+subdivision isn't taken for one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_fronts import answers, assert_same, available
+from plsys.compiler import compile
+from plsys.runtime import Scene
+
+SCENE = Path(__file__).resolve().parents[3] / "scenes" / "terrain.plsys"
+PREFIX = """
+global_settings { assumed_gamma 1.0  seed 4 }
+camera { location <4, -9, 8>  sky <0, 0, 1>  right <-4/3, 0, 0>  look_at <4, 4, 0> }
+light_source { <-20, -9, 12> color rgb 1 }
+Transformation T_corners { matrix xb - xa, yb - ya, zb - za, xc - xa, yc - ya, zc - za, 0, 0, 1, xa, ya, za; }
+"""
+# The triangle's longest side is halved: two triangles.
+HALVES = (
+    PREFIX
+    + """
+object { Half(9, 0, 0, 0, 8, 8, 1, 8, 0, 2) }
+Selection Half(n, xa, ya, za, xb, yb, zb, xc, yc, zc)
+{
+    if (n > 0) Half -> C_middle (Half(n - 1, xc, yc, zc, xa, ya, za, x, y, z) + Half(n - 1, xb, yb, zb, xc, yc, zc, x, y, z));
+    else       Half -> T_corners triangle;
+}
+Calculation C_middle { x = (xa + xb) / 2; y = (ya + yb) / 2; z = (za + zb) / 2 + 0.1*n*(hash(x, y) - 0.5); }
+"""
+)
+# Three triangles around a point; 3^5 = 243 of them, 27 a tile.
+THIRDS = (
+    PREFIX
+    + """
+object { Third(5, 0, 0, 0, 8, 0, 1, 8, 8, 2) rotate <0, 0, 20> translate <1, 2, 0.5> no_shadow }
+sphere { <4, 4, 3>, 0.5 }
+plane  { <0, 0, 1>, -1 }
+object { Third(5, 0, 0, 0, 0, 8, 1, 8, 8, 2) scale <1, 1, 1.5> }
+Selection Third(n, xa, ya, za, xb, yb, zb, xc, yc, zc)
+{
+    if (n > 0)
+        Third -> C_point (Third(n - 1, xa, ya, za, xb, yb, zb, x, y, z) + Third(n - 1, xb, yb, zb, xc, yc, zc, x, y, z)
+                        + Third(n - 1, xc, yc, zc, xa, ya, za, x, y, z));
+    else
+        Third -> T_corners triangle;
+}
+Calculation C_point { x = (xa + xb + xc) / 3; y = (ya + yb + yc) / 3; z = (za + zb + zc) / 3 + 0.1*n*(hash(x, y) - 0.5); }
+"""
+)
+# Heights are 0 but for a few: what is the same in the tiles looked at isn't in all of them.
+FLAT = SCENE.read_text().replace(
+    "rough*(hash(xab, yab) - 0.5)", "(hash(xab, yab) > 0.999 ? 1 : 0)"
+).replace("rough*(hash(xbc, ybc) - 0.5)", "(hash(xbc, ybc) > 0.999 ? 1 : 0)").replace(
+    "rough*(hash(xca, yca) - 0.5)", "(hash(xca, yca) > 0.999 ? 1 : 0)"
+).replace("-3", "0").replace("64, 64, 8", "64, 64, 0").replace("0, 64, 1", "0, 64, 0")  # fmt: skip
+
+
+def rays(data: bytes, count: int = 600) -> tuple[np.ndarray, np.ndarray]:
+    """From all around, from within, straight down, and through corners and middles of edges."""
+    random = np.random.default_rng(3)
+    with Scene(data, accelerator="none") as scene:
+        matrices = np.concatenate([batch.matrix[batch.kind == 6] for batch in scene.unfold()])
+    weights = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0.3, 0.3], [0.1, 0.6]])[random.integers(7, size=count)]
+    chosen = matrices[random.integers(len(matrices), size=count)]
+    targets = np.einsum("nij,nj->ni", chosen[:, :, :2], weights) + chosen[:, :, 3]
+    size = np.ptp(targets, axis=0).max()
+    origins = targets + random.normal(size=(count, 3)) * size * random.choice([0.01, 0.3, 3.0], (count, 1))
+    origins[::5, :2] = targets[::5, :2]
+    origins[1::5, 2] = targets[1::5, 2]
+    return origins, (targets - origins) * random.choice([1.0, 1e-3, 50.0], (count, 1))
+
+
+def tiles(data: bytes, **options) -> int:
+    with Scene(data, **options) as scene:
+        return scene.statistics["terrain"]["tiles"]
+
+
+def texts() -> dict[str, str]:
+    return {"terrain": SCENE.read_text(), "halves": HALVES, "thirds": THIRDS, "flat": FLAT}
+
+
+@pytest.mark.parametrize("name", texts())
+def test_the_hits_are_those_of_the_derivation(name):
+    data = compile(texts()[name], parameters={"level": 4} if name in ("terrain", "flat") else {})
+    assert tiles(data) >= 8
+    origins, directions = rays(data)
+    expected = answers(data, origins, directions, accelerator="none")
+    assert np.isfinite(expected["t"]).mean() > 0.5
+    assert_same(answers(data, origins, directions, accelerator="boxes"), expected, "boxes")
+    assert_same(answers(data, origins, directions, front_items=21), expected, "fronts")
+    for isa in available(data):
+        for threads in (1, 3):
+            assert_same(answers(data, origins, directions, isa=isa, threads=threads), expected, (isa, threads))
+
+
+@pytest.mark.parametrize("name", ["terrain", "thirds"])
+def test_the_picture_is_the_same(name):
+    data = compile(texts()[name], parameters={"level": 4} if name == "terrain" else {})
+    with Scene(data, accelerator="boxes") as scene:
+        expected = scene.render(64, 48)["color"]
+    with Scene(data) as scene:
+        np.testing.assert_array_equal(scene.render(64, 48)["color"], expected)
+        assert scene.statistics["terrain"]["tiles"]
+
+
+def test_what_few_tiles_do_not_show_is_learnt_from_more():
+    data = compile(FLAT, parameters={"level": 7})
+    assert tiles(data) == 512
+    origins, directions = rays(data, 3000)
+    with Scene(data) as scene, Scene(data, front_items=21) as fronts:
+        ours, theirs = scene.intersect(origins, directions), fronts.intersect(origins, directions)
+        assert scene.statistics["bytes"]["items"] < 16 * 2 * 4**7
+    assert_same(ours._asdict(), theirs._asdict(), "flat")
+
+
+def test_a_triangle_costs_a_few_bytes_and_is_counted():
+    data = compile(SCENE, parameters={"level": 8})
+    with Scene(data) as scene:
+        statistics = scene.statistics
+    assert statistics["primitives"] == 2 * 4**8 and statistics["depth"] == 10
+    assert statistics["terrain"]["tiles"] == 2 * 4**5
+    assert statistics["bytes"]["items"] + statistics["bytes"]["nodes"] < 14 * statistics["primitives"]
+    assert statistics["scene_bytes"] < 14 * statistics["primitives"] + 20_000
+
+
+def test_memory_that_is_not_enough_for_tiles():
+    data = compile(SCENE, parameters={"level": 5})
+    origins, directions = rays(data, 40)
+    expected = answers(data, origins, directions)
+    assert tiles(data, memory=64 * 1024) == 32
+    assert tiles(data, memory=32 * 1024) == 0
+    assert_same(answers(data, origins, directions, memory=32 * 1024), expected, "32 KB")
+
+
+# What departs from the shape, and how.
+DEPARTURES = {
+    "ends early at a place": ("if (n > 0)", "if (n > (hash(xa, ya) > 0.99 ? 1 : 0))"),
+    "leaves a triangle out": ("else\n", "else if (hash(xa, ya) < 0.99)\n"),
+    "a transformation on the way": ("Patch -> C_middles (", "Patch -> C_middles [ scale 1 1 0.99 ] ("),
+    "two shapes a triangle": ("T_corners triangle", "T_corners (triangle + sphere)"),
+    "another shape": ("T_corners triangle", "T_corners square"),
+    "a matrix that isn't of differences": ("zb - za, xc", "(zb - za)*1.01, xc"),
+    "every patch the same": ("matrix xb - xa, yb - ya, zb - za, xc - xa, yc - ya, zc - za, 0, 0, 1, xa, ya, za;",
+                             "matrix n - 1, n, n, n, n - 1, n, n, n, n - 1, n, n, n;"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", DEPARTURES)
+def test_what_is_no_regular_subdivision_is_not_taken_for_one(what):
+    text = SCENE.read_text()
+    assert DEPARTURES[what][0] in text
+    data = compile(text.replace(*DEPARTURES[what], 1), parameters={"level": 4})
+    assert tiles(data) == 0
+    with Scene(data, accelerator="none") as scene:
+        batches = [batch.matrix[:, :, 3] for batch in scene.unfold()]
+    targets = np.concatenate(batches)[1:60]
+    origins = targets + [3.0, 5.0, 40.0]
+    assert_same(
+        answers(data, origins, targets - origins), answers(data, origins, targets - origins, accelerator="none"), what
+    )
