@@ -137,8 +137,8 @@ def test_memory_that_is_not_enough_for_tiles():
 
 # What departs from the shape, and how.
 DEPARTURES = {
-    "ends early at a place": ("if (n > 0)", "if (n > (hash(xa, ya) > 0.99 ? 1 : 0))"),
-    "leaves a triangle out": ("else\n", "else if (hash(xa, ya) < 0.99)\n"),
+    "ends early at a place": ("if (n > 0)", "if (n > (hash(xa, ya) > 0.9 ? 1 : 0))"),
+    "leaves a triangle out": ("else\n", "else if (hash(xa, ya) < 0.9)\n"),
     "a transformation on the way": ("Patch -> C_middles (", "Patch -> C_middles [ scale 1 1 0.99 ] ("),
     "two shapes a triangle": ("T_corners triangle", "T_corners (triangle + sphere)"),
     "another shape": ("T_corners triangle", "T_corners square"),
