@@ -18,9 +18,6 @@
 /* A light this flat above the surface doesn't count (section 2). */
 #define LEAST_COSINE 1e-10
 
-/* A surface's tolerance grows by at most this factor towards grazing rays. */
-#define STEEPEST 1e-3
-
 /* A ray that waits to be traced. */
 typedef struct pl_bounce {
     double origin[3], direction[3], t_min;
@@ -44,7 +41,7 @@ struct pl_shader {
 typedef struct pl_spotted {
     const pl_bounce *ray;
     double point[3], normal[3]; /* turned against the ray */
-    double cosine;              /* of the angle between ray and normal, at least 0 */
+    double flat[3];             /* the surface's own normal, to either side */
     double width;               /* of the pixel's footprint here */
     double epsilon;             /* rounding error of the point, in our own tolerances */
     pl_pigment pigment;
@@ -130,6 +127,13 @@ typedef struct pl_shadow {
     bool failed;
 } pl_shadow;
 
+/* Sets where a ray in a direction leaves the surface: off it by its rounding error, in our own tolerances. */
+static void leave(const pl_shader *shader, const pl_spotted *at, const double direction[3], double origin[3])
+{
+    const double off = shader->view->povray_epsilon ? 0.0 : copysign(at->epsilon, pl_dot(direction, at->flat));
+    for (int axis = 0; axis < 3; axis++) origin[axis] = at->point[axis] + off * at->flat[axis];
+}
+
 /* What a surface on the way to the light lets through. */
 static bool passes(pl_shader *shader, const pl_ray *ray, const pl_hit *hit, double through[3], pl_error *error)
 {
@@ -176,14 +180,14 @@ static bool filter_light(pl_shader *shader, const pl_ray *ray, double color[3], 
 }
 
 /* Makes the arriving colour what is left of it behind everything between the point and the light. */
-static bool shadow_light(pl_shader *shader, const pl_spotted *at, const double towards[3], double cosine,
-                         double distance, double color[3], pl_error *error)
+static bool shadow_light(pl_shader *shader, const pl_spotted *at, const double towards[3], double distance,
+                         double color[3], pl_error *error)
 {
     const pl_view *view = shader->view;
     pl_ray ray = {.shadow = true, .width = at->width, .spread = view->spread};
-    memcpy(ray.origin, at->point, sizeof ray.origin);
+    leave(shader, at, towards, ray.origin);
     memcpy(ray.direction, towards, sizeof ray.direction);
-    ray.t_min = view->povray_epsilon ? POVRAY_SHADOW : at->epsilon / fmax(cosine, STEEPEST);
+    ray.t_min = view->povray_epsilon ? POVRAY_SHADOW : 0.0;
     ray.t_max = view->povray_epsilon ? fmin(distance - POVRAY_SHADOW, POVRAY_FARTHEST) : distance - at->epsilon;
     if (!(ray.t_min < ray.t_max)) return true;
     shader->rays.shadow++;
@@ -235,7 +239,7 @@ static bool add_light(pl_shader *shader, const pl_light *light, const pl_spotted
     const double glint = light->shadowless ? 0.0 : highlights(finish, at->normal, at->ray->direction, towards);
     for (int c = 0; c < 3; c++) share[c] = at->pigment.color[c] * opacity * (finish->diffuse * fall) + glint;
     if (share[0] == 0.0 && share[1] == 0.0 && share[2] == 0.0) return true;
-    if (!light->shadowless && !shadow_light(shader, at, towards, cosine, distance, color, error)) return false;
+    if (!light->shadowless && !shadow_light(shader, at, towards, distance, color, error)) return false;
     for (int c = 0; c < 3; c++) total[c] += color[c] * share[c];
     return true;
 }
@@ -274,19 +278,19 @@ static bool follow(pl_shader *shader, const pl_spotted *at, const double factor[
         shader->rays.bailout++;
         return true;
     }
-    memcpy(next.origin, at->point, sizeof next.origin);
     memcpy(next.direction, at->ray->direction, sizeof next.direction);
     for (int c = 0; c < 3; c++) next.share[c] = at->ray->share[c] * factor[c];
-    next.t_min = view->povray_epsilon ? nextafter(POVRAY_LEAST, 0.0) : at->epsilon / fmax(at->cosine, STEEPEST);
+    next.t_min = view->povray_epsilon ? nextafter(POVRAY_LEAST, 0.0) : 0.0;
     if (transmitted) {
         shader->rays.transmitted++;
-        return push(shader, &next, error);
+    } else {
+        const double along = pl_dot(next.direction, at->normal);
+        for (int axis = 0; axis < 3; axis++) next.direction[axis] -= 2.0 * along * at->normal[axis];
+        pl_normalize(next.direction);
+        next.level++;
+        shader->rays.reflection++;
     }
-    const double along = pl_dot(next.direction, at->normal);
-    for (int axis = 0; axis < 3; axis++) next.direction[axis] -= 2.0 * along * at->normal[axis];
-    pl_normalize(next.direction);
-    next.level++;
-    shader->rays.reflection++;
+    leave(shader, at, next.direction, next.origin);
     return push(shader, &next, error);
 }
 
@@ -331,11 +335,9 @@ static bool spot(const pl_bounce *bounce, const pl_ray *ray, double t, const pl_
     at->finish = pl_texture_finish(surface->texture);
     memcpy(at->point, surface->point, sizeof at->point);
     memcpy(at->normal, surface->normal, sizeof at->normal);
-    at->cosine = -pl_dot(at->normal, bounce->direction);
-    if (at->cosine < 0.0) {
-        at->cosine = -at->cosine;
+    memcpy(at->flat, surface->flat, sizeof at->flat);
+    if (pl_dot(at->normal, bounce->direction) > 0.0)
         for (int axis = 0; axis < 3; axis++) at->normal[axis] = -at->normal[axis];
-    }
     return pl_texture_pigment(surface->texture, surface->entries, surface->pattern_point, &at->pigment, error);
 }
 

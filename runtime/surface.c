@@ -17,6 +17,7 @@ enum { CUT_DEPTH = 64, CUT_STEPS = 4096 };
 typedef struct leaf_surface {
     const pl_shape *shape; /* NULL: a mesh */
     const pl_mesh_tree *mesh;
+    bool smooth; /* its surface has a flat normal as well */
     const double *arguments;
     uint32_t symbol; /* node, UINT32_MAX: none */
     int32_t rule;
@@ -67,24 +68,36 @@ static void map_normal_back(const pl_transform *transform, double n[3])
     for (int axis = 0; axis < 3; axis++) n[axis] /= size;
 }
 
-/* Sets the normal in the leaf's own frame. */
-static void begin_normal(const leaf_surface *leaf, const pl_hit *hit, double n[3])
+/* Sets the normals in the leaf's own frame. */
+static void begin_normals(leaf_surface *leaf, const pl_hit *hit, pl_surface *surface)
 {
-    if (leaf->mesh) pl_mesh_normal(leaf->mesh, hit->part, hit->local, n);
-    else leaf->shape->normal(leaf->arguments, hit->part, hit->local, n);
+    leaf->smooth = leaf->mesh && pl_mesh_is_smooth(leaf->mesh);
+    if (leaf->mesh) pl_mesh_normal(leaf->mesh, hit->part, hit->local, surface->normal);
+    else leaf->shape->normal(leaf->arguments, hit->part, hit->local, surface->normal);
+    if (leaf->smooth) pl_mesh_flat_normal(leaf->mesh, hit->part, surface->flat);
+}
+
+static void map_normals_back(const leaf_surface *leaf, const pl_transform *transform, pl_surface *surface)
+{
+    map_normal_back(transform, surface->normal);
+    if (leaf->smooth) map_normal_back(transform, surface->flat);
+}
+
+static void set_unit(double n[3])
+{
+    double size = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
+    for (int axis = 0; axis < 3; axis++) n[axis] /= size;
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (int axis = 0; axis < 3; axis++) n[axis] /= length;
 }
 
 static void finish_surface(const pl_scene *scene, const leaf_surface *leaf, const pl_ray *ray, const pl_hit *hit,
                            pl_surface *surface)
 {
-    double *n = surface->normal;
-    double size = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
-    for (int axis = 0; axis < 3; axis++) n[axis] /= size;
-    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    for (int axis = 0; axis < 3; axis++) {
-        n[axis] /= length;
-        surface->point[axis] = ray->origin[axis] + hit->t * ray->direction[axis];
-    }
+    set_unit(surface->normal);
+    if (leaf->smooth) set_unit(surface->flat);
+    else memcpy(surface->flat, surface->normal, sizeof surface->flat);
+    for (int axis = 0; axis < 3; axis++) surface->point[axis] = ray->origin[axis] + hit->t * ray->direction[axis];
     surface->symbol = leaf->symbol == UINT32_MAX ? -1 : (int32_t)scene->program->nodes[leaf->symbol].symbol;
     surface->rule = leaf->rule;
     surface->depth = (int32_t)leaf->depth;
@@ -137,7 +150,7 @@ static bool finish_cut(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, 
     double length = 0.0;
     for (int axis = 0; axis < 3; axis++) length += ray->direction[axis] * ray->direction[axis];
     for (int axis = 0; axis < 3; axis++) {
-        surface->normal[axis] = -ray->direction[axis] / sqrt(length);
+        surface->flat[axis] = surface->normal[axis] = -ray->direction[axis] / sqrt(length);
         surface->point[axis] = ray->origin[axis] + hit->t * ray->direction[axis];
     }
     surface->symbol = (int32_t)program->nodes[symbol].symbol;
@@ -188,8 +201,8 @@ static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit
     leaf.symbol = walk->at.symbol;
     leaf.rule = walk->at.rule;
     leaf.depth = walk->at.depth;
-    begin_normal(&leaf, hit, surface->normal);
-    for (size_t i = tracer->chain.count; i-- > 0;) map_normal_back(&tracer->chain.list[i], surface->normal);
+    begin_normals(&leaf, hit, surface);
+    for (size_t i = tracer->chain.count; i-- > 0;) map_normals_back(&leaf, &tracer->chain.list[i], surface);
     finish_surface(tracer->scene, &leaf, ray, hit, surface);
     return true;
 }
@@ -235,10 +248,10 @@ static void items_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hi
     if (last->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[last->what];
     else leaf.shape = pl_shape_of(last->what);
     begin_surface(tracer, ray, hit, surface);
-    begin_normal(&leaf, hit, surface->normal);
+    begin_normals(&leaf, hit, surface);
     for (size_t i = items->count; i-- > 0;) {
         const pl_item *item = items->list[i];
-        for (uint32_t k = item->transform_count; k-- > 0;) map_normal_back(item->transforms[k], surface->normal);
+        for (uint32_t k = item->transform_count; k-- > 0;) map_normals_back(&leaf, item->transforms[k], surface);
         if (leaf.rule < 0) leaf.rule = item->rule;
         if (item->kind != PL_NODE_ENTER) continue;
         if (leaf.depth++ == 0) leaf.symbol = scene->states.list[item->what].symbol;

@@ -144,5 +144,5 @@ double pl_hit_epsilon(const pl_surface *surface, const pl_ray *ray, double t)
         from += fabs(ray->origin[axis]);
         along += fabs(ray->direction[axis]);
     }
-    return 64.0 * DBL_EPSILON * (from + t * along) * (1.0 + surface->depth);
+    return 16.0 * DBL_EPSILON * (from + t * along) * (1.0 + surface->depth);
 }

@@ -40,6 +40,7 @@ typedef struct pl_hit {
 typedef struct pl_surface {
     double point[3];         /* world: origin + t * direction */
     double normal[3];        /* world, unit, as the shape has it (smooth where the mesh is) */
+    double flat[3];          /* the same, but of the triangle itself where the mesh is smooth */
     const double *texture;   /* PL_TEXTURE_VALUES numbers, then entries; valid until the tracer's next surface call */
     uint32_t entries;
     double pattern_point[3]; /* the hit point in the frame where the texture stands (before its own matrix) */
@@ -71,9 +72,9 @@ uint64_t pl_trace_primitive(pl_tracer *tracer, const pl_hit *hit);
 
 bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface, pl_error *error);
 
-/* A t_min that is safe for rays of unit-length direction that start at a surface found at t on a ray: some ulps of the
- * largest coordinate that the hit was computed from, a level of the path. The same length along the normal lifts such a
- * ray's origin off the surface. */
+/* How far rounding may have carried the point found at t on a ray off its surface, and a ray from there: some ulps of the
+ * coordinates that the hit was computed from, a level of the path. So it grows and shrinks with the scene. A ray that starts so
+ * far along the flat normal, on the side to which it goes, can't meet its own surface again, however grazing it is. */
 double pl_hit_epsilon(const pl_surface *surface, const pl_ray *ray, double t);
 
 /* The tracer's counters of the last primary ray (for the extra channels) and totals. */

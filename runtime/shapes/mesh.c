@@ -256,6 +256,20 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+bool pl_mesh_is_smooth(const pl_mesh_tree *tree)
+{
+    return tree->mesh->normals != NULL;
+}
+
+void pl_mesh_flat_normal(const pl_mesh_tree *tree, int32_t triangle, double n[3])
+{
+    double edge[2][3];
+    for (int i = 0; i < 2; i++)
+        for (int axis = 0; axis < 3; axis++)
+            edge[i][axis] = corner(tree->mesh, (uint32_t)triangle, i + 1)[axis] - corner(tree->mesh, (uint32_t)triangle, 0)[axis];
+    cross(edge[0], edge[1], n);
+}
+
 void pl_mesh_normal(const pl_mesh_tree *tree, int32_t triangle, const double p[3], double n[3])
 {
     const pl_mesh *mesh = tree->mesh;

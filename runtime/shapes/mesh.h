@@ -29,7 +29,11 @@ bool pl_mesh_nearest(const pl_mesh_tree *tree, const double o[3], const double d
 bool pl_mesh_each(const pl_mesh_tree *tree, const double o[3], const double d[3], double t_min, double t_max,
                   bool (*visit)(void *context, pl_root root), void *context);
 
-/* The (smooth, where given) normal of a triangle at a point; any positive length. */
+/* The (smooth, where given) normal of a triangle at a point, and the triangle's own; any positive length. */
 void pl_mesh_normal(const pl_mesh_tree *tree, int32_t triangle, const double p[3], double n[3]);
+void pl_mesh_flat_normal(const pl_mesh_tree *tree, int32_t triangle, double n[3]);
+
+/* Whether the two may differ. */
+bool pl_mesh_is_smooth(const pl_mesh_tree *tree);
 
 #endif
