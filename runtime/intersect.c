@@ -7,6 +7,7 @@
 
 #include "error.h"
 #include "scene.h"
+#include "vector.h"
 
 enum { CHUNK = 512 };
 
@@ -25,18 +26,16 @@ typedef struct job {
 
 static bool set_ray(const job *j, size_t i, pl_ray *ray, pl_error *error)
 {
-    double length = 0.0;
+    const double *o = j->origins + 3 * i, *d = j->directions + 3 * i;
     for (int axis = 0; axis < 3; axis++) {
-        ray->origin[axis] = j->origins[3 * i + (size_t)axis];
-        ray->direction[axis] = j->directions[3 * i + (size_t)axis];
-        length = fmax(length, fabs(ray->direction[axis]));
-        if (!isfinite(ray->origin[axis]) || !isfinite(ray->direction[axis]))
-            return pl_fail(error, PL_ERROR_ARGUMENT, "rays", "ray %zu has a number that isn't finite", i);
+        ray->origin[axis] = o[axis];
+        ray->direction[axis] = d[axis];
     }
-    if (length == 0.0) return pl_fail(error, PL_ERROR_ARGUMENT, "rays", "the direction of ray %zu is zero", i);
-    ray->t_min = 0.0;
     ray->t_max = j->distance ? j->distance[i] : INFINITY;
-    ray->shadow = false;
+    if (!pl_finite(o) || !pl_finite(d))
+        return pl_fail(error, PL_ERROR_ARGUMENT, "rays", "ray %zu has a number that isn't finite", i);
+    if (d[0] == 0.0 && d[1] == 0.0 && d[2] == 0.0)
+        return pl_fail(error, PL_ERROR_ARGUMENT, "rays", "the direction of ray %zu is zero", i);
     return true;
 }
 
@@ -44,7 +43,10 @@ static bool describe(pl_tracer *tracer, const pl_hits *out, size_t i, const pl_r
                      pl_error *error)
 {
     bool found = hit->t < INFINITY;
-    pl_surface surface = {.symbol = -1, .rule = -1};
+    pl_surface surface;
+    surface.symbol = surface.rule = -1;
+    surface.depth = 0;
+    surface.normal[0] = surface.normal[1] = surface.normal[2] = 0.0;
     if (found && (out->symbol || out->rule || out->depth || out->normal) &&
         !pl_trace_surface(tracer, ray, hit, &surface, error))
         return false;
@@ -62,14 +64,21 @@ static bool describe(pl_tracer *tracer, const pl_hits *out, size_t i, const pl_r
     return true;
 }
 
-static bool trace_one(job *j, pl_tracer *tracer, size_t i, pl_hit *hit, pl_error *error)
+/* Traces up to PL_TRACE_MANY rays from `first` on; returns how many were done before an error. */
+static unsigned trace_some(job *j, pl_tracer *tracer, size_t first, unsigned count, pl_ray *rays, pl_hit *hits,
+                           pl_error *error)
 {
-    pl_ray ray = {0};
-    if (!set_ray(j, i, &ray, error)) return false;
-    if (j->hits) return pl_trace_nearest(tracer, &ray, hit, error) && describe(tracer, j->hits, i, &ray, hit, error);
-    int found = pl_trace_any(tracer, &ray, error);
-    j->occluded[i] = found > 0;
-    return found >= 0;
+    unsigned known = 0, done = 0;
+    while (known < count && set_ray(j, first + known, &rays[known], error)) known++;
+    if (!j->hits) {
+        int found = 0;
+        for (; done < known && (found = pl_trace_any(tracer, &rays[done], error)) >= 0; done++)
+            j->occluded[first + done] = found > 0;
+        return done;
+    }
+    unsigned traced = pl_trace_nearest_many(tracer, rays, known, hits, error);
+    while (done < traced && describe(tracer, j->hits, first + done, &rays[done], &hits[done], error)) done++;
+    return done;
 }
 
 static void report(job *j, size_t ray, const pl_error *error)
@@ -93,20 +102,24 @@ static void *work(void *context)
         report(j, j->n, &error);
         return NULL;
     }
-    pl_hit hit;
-    pl_hit_init(&hit);
+    pl_ray rays[PL_TRACE_MANY] = {0};
+    pl_hit hits[PL_TRACE_MANY];
+    for (int i = 0; i < PL_TRACE_MANY; i++) pl_hit_init(&hits[i]);
     while (!atomic_load(&j->stop)) {
         size_t first = atomic_fetch_add(&j->next, CHUNK);
         if (first >= j->n) break;
         size_t end = j->n - first < CHUNK ? j->n : first + CHUNK;
         size_t i = first;
-        while (i < end && trace_one(j, tracer, i, &hit, &error)) i++;
+        for (unsigned count = 0, done = 0; i < end && done == count; i += done) {
+            count = end - i < PL_TRACE_MANY ? (unsigned)(end - i) : PL_TRACE_MANY;
+            done = trace_some(j, tracer, i, count, rays, hits, &error);
+        }
         if (i == end) continue;
         report(j, i, &error);
         break;
     }
     pl_scene_count(j->scene, tracer, &(pl_ray_counts){0});
-    pl_hit_free(&hit);
+    for (int i = 0; i < PL_TRACE_MANY; i++) pl_hit_free(&hits[i]);
     pl_tracer_destroy(tracer);
     return NULL;
 }

@@ -8,6 +8,7 @@
 
 #include "accel/query.h"
 #include "error.h"
+#include "vector.h"
 
 pl_tracer *pl_tracer_create(const pl_scene *scene, pl_error *error)
 {
@@ -61,23 +62,20 @@ void pl_hit_free(pl_hit *hit)
     pl_hit_init(hit);
 }
 
-static pl_query begin_query(pl_tracer *tracer, const pl_ray *ray, pl_query_kind kind, pl_error *error)
+static void begin_query(pl_query *query, pl_tracer *tracer, const pl_ray *ray, pl_query_kind kind, pl_error *error)
 {
-    const double *d = ray->direction, px = tracer->scene->detail;
-    const double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-    return (pl_query){.kind = kind,
-                      .footprint = {px * ray->width, px * ray->spread, px * ray->width / length},
-                      .length = length,
-                      .ray = tracer->scene->states.cuts ? pl_cut_ray(ray->origin, ray->direction) : 0,
-                      .t_min = ray->t_min,
-                      .t_max = ray->t_max,
-                      .shadow = ray->shadow,
-                      .list = tracer->list,
-                      .scratch = &tracer->scratch,
-                      .spare = &tracer->spare,
-                      .items = &tracer->items,
-                      .scene = tracer->scene,
-                      .error = error};
+    query->kind = kind;
+    query->t_min = ray->t_min;
+    query->t_max = ray->t_max;
+    query->shadow = ray->shadow;
+    query->found = query->done = false;
+    query->tracer = tracer;
+    query->error = error;
+    if (!tracer->scene->states.cuts) return;
+    const double px = tracer->scene->detail;
+    query->length = sqrt(pl_dot(ray->direction, ray->direction));
+    query->footprint = (pl_footprint){px * ray->width, px * ray->spread, px * ray->width / query->length};
+    query->ray = pl_cut_ray(ray->origin, ray->direction);
 }
 
 uint64_t pl_trace_primitive(pl_tracer *tracer, const pl_hit *hit)
@@ -93,13 +91,19 @@ uint64_t pl_trace_primitive(pl_tracer *tracer, const pl_hit *hit)
     return primitive;
 }
 
-bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_error *error)
+static void begin_hit(pl_hit *hit)
 {
-    pl_query query = begin_query(tracer, ray, PL_QUERY_NEAREST, error);
-    query.hit = hit;
     hit->t = INFINITY;
     hit->bound = NAN;
     hit->cut_depth = 0;
+}
+
+bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_error *error)
+{
+    pl_query query;
+    begin_query(&query, tracer, ray, PL_QUERY_NEAREST, error);
+    query.hit = hit;
+    begin_hit(hit);
     if (!tracer->scene->accel->trace(tracer, ray, &query)) {
         hit->t = INFINITY;
         return false;
@@ -111,6 +115,28 @@ bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_erro
     return true;
 }
 
+static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_hit *hits)
+{
+    const pl_accel *accel = tracer->scene->accel;
+    pl_query queries[PL_TRACE_MANY];
+    pl_error error; /* is that of one of the rays: alone they tell which */
+    if (!accel->is_packet || !accel->is_packet(tracer, rays, count)) return false;
+    for (unsigned i = 0; i < count; i++) {
+        begin_query(&queries[i], tracer, &rays[i], PL_QUERY_NEAREST, &error);
+        queries[i].hit = &hits[i];
+        begin_hit(&hits[i]);
+    }
+    return accel->trace_packet(tracer, rays, queries, count);
+}
+
+unsigned pl_trace_nearest_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_hit *hits, pl_error *error)
+{
+    if (trace_packet(tracer, rays, count, hits)) return count;
+    for (unsigned i = 0; i < count; i++)
+        if (!pl_trace_nearest(tracer, &rays[i], &hits[i], error)) return i;
+    return count;
+}
+
 bool pl_trace_number(pl_tracer *tracer, pl_hit *hit, pl_error *error)
 {
     const pl_accel *accel = tracer->scene->accel;
@@ -119,7 +145,8 @@ bool pl_trace_number(pl_tracer *tracer, pl_hit *hit, pl_error *error)
 
 int pl_trace_any(pl_tracer *tracer, const pl_ray *ray, pl_error *error)
 {
-    pl_query query = begin_query(tracer, ray, PL_QUERY_ANY, error);
+    pl_query query;
+    begin_query(&query, tracer, ray, PL_QUERY_ANY, error);
     if (!tracer->scene->accel->trace(tracer, ray, &query)) return -1;
     return query.found;
 }
@@ -127,7 +154,8 @@ int pl_trace_any(pl_tracer *tracer, const pl_ray *ray, pl_error *error)
 bool pl_trace_all(pl_tracer *tracer, const pl_ray *ray, bool (*visit)(void *context, const pl_hit *hit), void *context,
                   pl_error *error)
 {
-    pl_query query = begin_query(tracer, ray, PL_QUERY_ALL, error);
+    pl_query query;
+    begin_query(&query, tracer, ray, PL_QUERY_ALL, error);
     tracer->list->count = 0;
     if (!tracer->scene->accel->trace(tracer, ray, &query)) return false;
     pl_hit_list_sort(tracer->list);

@@ -20,22 +20,17 @@
 
 typedef enum pl_query_kind { PL_QUERY_NEAREST, PL_QUERY_ANY, PL_QUERY_ALL } pl_query_kind;
 
-struct pl_hit_list;
-
 /* What is asked for. */
 typedef struct pl_query {
     pl_query_kind kind;
     double t_min, t_max; /* open interval; t_max shrinks to just beyond the best hit */
-    pl_footprint footprint; /* for the gates of instances */
-    double length;          /* of the ray's direction in the world */
-    uint64_t ray;           /* its key (pl_cut_ray), with cut-offs */
+    pl_footprint footprint; /* with cut-offs, for the gates of instances … */
+    double length;          /* … of the ray's direction in the world … */
+    uint64_t ray;           /* … and its key (pl_cut_ray) */
     bool shadow;         /* skip what stands below no_shadow */
     bool found, done;    /* done: no more leaves are wanted */
     pl_hit *hit;         /* nearest: the best so far */
-    struct pl_hit_list *list; /* all */
-    pl_path *scratch, *spare;
-    pl_items *items; /* scratch, like them */
-    const pl_scene *scene;
+    pl_tracer *tracer; /* all: its list */
     pl_error *error;
 } pl_query;
 
@@ -92,6 +87,9 @@ struct pl_accel {
     void (*work_destroy)(void *work);
     /* Offers all leaves that matter. false: an error. */
     bool (*trace)(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
+    /* Of up to PL_TRACE_MANY rays: whether they go well together, and tracing them so. NULL: one by one. */
+    bool (*is_packet)(const pl_tracer *tracer, const pl_ray *rays, unsigned count);
+    bool (*trace_packet)(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
     /* The items from the scene's to the leaf's at a trail; NULL: its hits have paths. false: no memory. */
     bool (*items)(const pl_scene *scene, const pl_path *trail, pl_items *items);
     /* Finds a hit's primitive index where tracing leaves it open; NULL: it doesn't. false: an error. */

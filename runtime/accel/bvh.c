@@ -6,6 +6,9 @@
 
 #include "../error.h"
 
+/* Fewer rays don't gain from going together. */
+enum { LEAST_LANES = 3 };
+
 /* --- working memory --- */
 
 static void *work_create(const pl_scene *scene, pl_error *error)
@@ -27,6 +30,8 @@ static void work_destroy(void *memory)
     free(w->frames);
     free(w->stack);
     free(w->chain);
+    free(w->packets);
+    free(w->packet_stack);
     free(w);
 }
 
@@ -51,18 +56,37 @@ bool pl_bvh_grow_stack(pl_bvh_work *w, size_t top, pl_error *error)
     return grow(&w->stack, top + 64, &w->stack_capacity, sizeof *w->stack, error);
 }
 
+bool pl_bvh_grow_packets(pl_bvh_work *w, size_t count, pl_error *error)
+{
+    return pl_bvh_grow_frames(w, count, error) &&
+           grow(&w->packets, count + 1, &w->packet_capacity, sizeof *w->packets, error);
+}
+
+bool pl_bvh_grow_packet_stack(pl_bvh_work *w, size_t top, pl_error *error)
+{
+    return grow(&w->packet_stack, top + 64, &w->packet_stack_capacity, sizeof *w->packet_stack, error);
+}
+
 /* --- candidates --- */
+
+bool pl_bvh_chain(pl_bvh_work *w, const pl_front *front, uint32_t opened, size_t *count, pl_error *error)
+{
+    size_t length = 0;
+    for (uint32_t at = front->opened[opened].moved; at; at = front->opened[front->opened[at].parent].moved) {
+        if (length >= w->chain_capacity && !grow(&w->chain, length + 1, &w->chain_capacity, sizeof *w->chain, error))
+            return false;
+        w->chain[length++] = front->opened[at].item;
+    }
+    *count = length;
+    return true;
+}
 
 /* Maps a ray from a front's state to an item of an opened node, one transformation after another. */
 static bool map_down(pl_bvh_work *w, const pl_front *front, uint32_t opened, const pl_item *item, double o[3],
                      double d[3], pl_error *error)
 {
-    size_t count = 0;
-    for (uint32_t at = front->opened[opened].moved; at; at = front->opened[front->opened[at].parent].moved) {
-        if (count >= w->chain_capacity && !grow(&w->chain, count + 1, &w->chain_capacity, sizeof *w->chain, error))
-            return false;
-        w->chain[count++] = front->opened[at].item;
-    }
+    size_t count;
+    if (!pl_bvh_chain(w, front, opened, &count, error)) return false;
     while (count > 0) {
         const pl_item *at = w->chain[--count];
         for (uint32_t i = 0; i < at->transform_count; i++) pl_map_ray(at->transforms[i], o, d);
@@ -114,24 +138,14 @@ static bool write_trail(const void *source, pl_path *trail)
     return true;
 }
 
-bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query)
+bool pl_bvh_offer(pl_tracer *tracer, uint32_t frame, pl_ref ref, const pl_item *item, const double o[3],
+                  const double d[3], pl_query *query)
 {
-    pl_bvh_work *w = tracer->work;
-    const pl_scene *scene = tracer->scene;
-    pl_frame *f = &w->frames[frame];
-    const pl_front *front = f->front;
-    const pl_front_primitive *primitive = &front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = pl_front_item(&scene->states, front, primitive->opened, primitive->item);
-    double o[3], d[3];
-    if (!f->mapped && !map_frame(scene, w, frame, query->error)) return false;
-    memcpy(o, f->normative_o, sizeof o);
-    memcpy(d, f->normative_d, sizeof d);
-    if (!map_down(w, front, primitive->opened, item, o, d, query->error)) return false;
-    place p = {scene, w, frame, ref};
+    place p = {tracer->scene, tracer->work, frame, ref};
     pl_leaf leaf = {
         .shape = item->what,
         .arguments = item->arguments,
-        .mesh = item->kind == PL_NODE_MESH ? scene->meshes[item->what] : NULL,
+        .mesh = item->kind == PL_NODE_MESH ? tracer->scene->meshes[item->what] : NULL,
         .trail = write_trail,
         .source = &p,
         .o = o,
@@ -139,6 +153,21 @@ bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *q
     };
     tracer->counters.primitive_tests++;
     return pl_query_leaf(query, &leaf);
+}
+
+bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query)
+{
+    pl_bvh_work *w = tracer->work;
+    const pl_scene *scene = tracer->scene;
+    pl_frame *f = &w->frames[frame];
+    const pl_front_primitive *primitive = &f->front->primitives[ref & PL_REF_INDEX];
+    const pl_item *item = pl_front_item(&scene->states, f->front, primitive->opened, primitive->item);
+    double o[3], d[3];
+    if (!f->mapped && !map_frame(scene, w, frame, query->error)) return false;
+    memcpy(o, f->normative_o, sizeof o);
+    memcpy(d, f->normative_d, sizeof d);
+    return map_down(w, f->front, primitive->opened, item, o, d, query->error) &&
+           pl_bvh_offer(tracer, frame, ref, item, o, d, query);
 }
 
 /* --- from a trail to the items on the path --- */
@@ -188,6 +217,34 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     }
 }
 
+/* Whether rays go well together: all directions lie about the first's, and so do the origins, as seen from the scene's
+ * size. */
+static bool is_packet(const pl_tracer *tracer, const pl_ray *rays, unsigned count)
+{
+    const double scale = ((const pl_fronts *)tracer->scene->structure)->list->scale;
+    if (tracer->scene->isa == PL_ISA_SCALAR || count <= LEAST_LANES) return false;
+    const double *first = rays->direction, near = 0.125 * (fabs(first[0]) + fabs(first[1]) + fabs(first[2]));
+    for (unsigned i = 1; i < count; i++)
+        for (int axis = 0; axis < 3; axis++) {
+            const double d = first[axis], o = rays->origin[axis];
+            if (!(d * rays[i].direction[axis] > 0.0) || !(fabs(rays[i].direction[axis] - d) < near) ||
+                !(fabs(rays[i].origin[axis] - o) * scale < 0.125))
+                return false;
+        }
+    return true;
+}
+
+static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
+{
+#ifdef __x86_64__
+    if (tracer->scene->isa == PL_ISA_AVX512) return pl_bvh_packet_avx512(tracer, rays, queries, count);
+    return pl_bvh_packet_avx2(tracer, rays, queries, count);
+#else
+    (void)tracer, (void)rays, (void)queries, (void)count;
+    return false;
+#endif
+}
+
 const pl_accel pl_accel_bvh = {.name = "bvh",
                                .states = true,
                                .build = pl_fronts_build,
@@ -195,4 +252,6 @@ const pl_accel pl_accel_bvh = {.name = "bvh",
                                .work_create = work_create,
                                .work_destroy = work_destroy,
                                .trace = trace,
+                               .is_packet = is_packet,
+                               .trace_packet = trace_packet,
                                .items = trail_items};

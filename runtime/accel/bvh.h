@@ -22,21 +22,56 @@ typedef struct pl_frame {
     double normative_o[3], normative_d[3];
 } pl_frame;
 
+enum { PL_LANES = PL_TRACE_MANY };
+
+typedef struct pl_lanes {
+    double o[3][PL_LANES], d[3][PL_LANES];
+} pl_lanes;
+
+/* The same of a packet of rays, which share t0: axis by axis. front and instance stand in the frame of the same number. */
+typedef struct pl_packet_frame {
+    double o[3][PL_LANES], d[3][PL_LANES];
+    float origin[3][PL_LANES], direction[3][PL_LANES], inverse[3][PL_LANES], t_max[PL_LANES];
+    double t0, rate;
+    const pl_front *front;
+    float error, distance, slack; /* the largest */
+    float most;      /* of t_max */
+    unsigned lanes;  /* those that meet the box */
+    unsigned mapped; /* fours of rays that normative is known of */
+    uint32_t instance;
+    pl_lanes normative;
+} pl_packet_frame;
+
 typedef struct pl_bvh_work {
     pl_frame *frames;
     uint64_t *stack; /* local t of entry as float bits, reference below */
     const pl_item **chain;
     size_t frame_capacity, stack_capacity, chain_capacity;
+    pl_packet_frame *packets;
+    uint64_t *packet_stack;
+    size_t packet_capacity, packet_stack_capacity;
 } pl_bvh_work;
 
 typedef bool pl_bvh_kernel(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
 extern pl_bvh_kernel pl_bvh_trace_scalar, pl_bvh_trace_avx2, pl_bvh_trace_avx512;
 
+typedef bool pl_bvh_packet_kernel(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
+extern pl_bvh_packet_kernel pl_bvh_packet_avx2, pl_bvh_packet_avx512;
+
 /* Evaluates a primitive of a frame normatively and offers it. false: an error. */
 bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query);
+
+/* Offers a primitive of a frame with the normative ray in the primitive's own frame. */
+bool pl_bvh_offer(pl_tracer *tracer, uint32_t frame, pl_ref ref, const pl_item *item, const double o[3],
+                  const double d[3], pl_query *query);
+
+/* The items with transformations on the way to an opened node, into work->chain, the last one first. */
+bool pl_bvh_chain(pl_bvh_work *work, const pl_front *front, uint32_t opened, size_t *count, pl_error *error);
 
 /* Room for one more frame, for eight more entries above `top`; false: no memory. */
 bool pl_bvh_grow_frames(pl_bvh_work *work, size_t count, pl_error *error);
 bool pl_bvh_grow_stack(pl_bvh_work *work, size_t top, pl_error *error);
+bool pl_bvh_grow_packets(pl_bvh_work *work, size_t count, pl_error *error);
+bool pl_bvh_grow_packet_stack(pl_bvh_work *work, size_t top, pl_error *error);
 
 #endif

@@ -358,13 +358,13 @@ static inline bool begin(pl_bvh_work *w, const pl_front *front, bool met, size_t
     return true;
 }
 
-/* met: the root's box; else only what is unbounded there counts. */
-static inline bool visit(pl_tracer *tracer, pl_query *query, bool met, bool any)
+/* From frame `base` on. met: its box; else only what is unbounded there counts. */
+static inline bool visit(pl_tracer *tracer, pl_query *query, uint32_t base, bool met, bool any)
 {
     pl_bvh_work *w = tracer->work;
     uint64_t *stack, steps = 0;
-    uint32_t frame = 0;
-    const pl_frame *f = &w->frames[0];
+    uint32_t frame = base;
+    const pl_frame *f = &w->frames[base];
     size_t top = 0;
     near n;
     if (!begin(w, f->front, met, &top, query->error)) return false;
@@ -387,7 +387,7 @@ static inline bool visit(pl_tracer *tracer, pl_query *query, bool met, bool any)
         }
         uint32_t kind = ref >> PL_REF_SHIFT;
         if (kind == PL_KIND_RETURN) {
-            if (frame == 0) break;
+            if (frame == base) break;
             f = &w->frames[--frame];
             look(&n, f);
             n.t_max = local_t_max(f, query->t_max);
@@ -450,7 +450,7 @@ bool KERNEL(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     root->mapped = true;
     memcpy(root->normative_o, ray->origin, sizeof root->normative_o);
     memcpy(root->normative_d, ray->direction, sizeof root->normative_d);
-    bool ok = query->kind == PL_QUERY_ANY ? visit(tracer, query, met, true) : visit(tracer, query, met, false);
+    bool ok = query->kind == PL_QUERY_ANY ? visit(tracer, query, 0, met, true) : visit(tracer, query, 0, met, false);
     wide_end();
     return ok;
 }

@@ -25,7 +25,8 @@ bool pl_items_path(const pl_items *items, pl_path *path)
 
 static bool trail_path(const pl_query *query, const pl_path *trail, pl_path *path)
 {
-    return query->scene->accel->items(query->scene, trail, query->items) && pl_items_path(query->items, path);
+    return query->tracer->scene->accel->items(query->tracer->scene, trail, &query->tracer->items) &&
+           pl_items_path(&query->tracer->items, path);
 }
 
 /* A leaf's path in union terms; where it has a trail, that too. */
@@ -40,8 +41,8 @@ static int comes_before(pl_query *query, const pl_leaf *leaf)
 {
     pl_hit *hit = query->hit;
     if (leaf->trail && !trail_path(query, &hit->trail, &hit->path)) return -1;
-    if (!leaf_path(query, leaf, query->spare, query->scratch)) return -1;
-    return pl_path_compare(query->scratch, &hit->path) < 0;
+    if (!leaf_path(query, leaf, &query->tracer->spare, &query->tracer->scratch)) return -1;
+    return pl_path_compare(&query->tracer->scratch, &hit->path) < 0;
 }
 
 static void set_hit(pl_hit *hit, const pl_leaf *leaf, const pl_root *root)
@@ -73,7 +74,7 @@ static bool keep_nearest(pl_query *query, const pl_leaf *leaf, const pl_root *ro
 
 static bool keep_listed(pl_query *query, const pl_leaf *leaf, const pl_root *root)
 {
-    pl_hit_list *list = query->list;
+    pl_hit_list *list = query->tracer->list;
     if (list->count == list->capacity) {
         size_t capacity = list->capacity ? 2 * list->capacity : 16;
         pl_hit *hits = realloc(list->hits, capacity * sizeof *hits);

@@ -1,0 +1,126 @@
+/* kernel_lanes.h - primitives against eight rays at a time: the filters of kernel.h, wider, for kernel_packet.h. */
+
+enum { HALF = 8, QUADS = PL_LANES / 4 };
+
+#define wide_and(a, b) _mm256_and_ps(a, b)
+#define wide_mask_of(x) ((unsigned)_mm256_movemask_ps(x))
+#define SIGN _mm256_set1_ps(-0.0f)
+
+static inline wide wide_absolute(wide x)
+{
+    return _mm256_andnot_ps(SIGN, x);
+}
+
+/* All bits of the lanes that are set in a mask. */
+static inline wide wide_lanes(unsigned mask)
+{
+    const __m256i bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    return _mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32((int)mask), bit), bit));
+}
+
+static inline float wide_least(wide x)
+{
+    __m128 v = _mm_min_ps(_mm256_castps256_ps128(x), _mm256_extractf128_ps(x, 1));
+    v = _mm_min_ps(v, _mm_movehl_ps(v, v));
+    return _mm_cvtss_f32(_mm_min_ss(v, _mm_shuffle_ps(v, v, 1)));
+}
+
+static inline float wide_most(wide x)
+{
+    return -wide_least(-x);
+}
+
+/* 1 / d, finite. */
+static inline wide wide_inverse(wide d, float least)
+{
+    return wide_set(1.0f) / _mm256_or_ps(wide_max(wide_absolute(d), wide_set(least)), wide_and(d, SIGN));
+}
+
+typedef struct wide_interval {
+    wide enter, leave;
+} wide_interval;
+
+static inline void between_lanes(wide_interval *i, wide o, wide d, float lo, float hi)
+{
+    const wide inverse = wide_inverse(d, 1e-30f);
+    const wide a = (wide_set(lo) - o) * inverse, b = (wide_set(hi) - o) * inverse;
+    i->enter = wide_max(wide_min(a, b), i->enter);
+    i->leave = wide_min(wide_max(a, b), i->leave);
+}
+
+/* As inside_quadric; lanes that miss get an empty interval. */
+static inline void quadric_lanes(wide_interval *i, wide a, wide b, wide discriminant)
+{
+    const wide bent = _mm256_cmp_ps(a, wide_set(1e-30f), _CMP_GT_OQ), zero = wide_set(0.0f);
+    const wide root = _mm256_sqrt_ps(wide_max(discriminant, zero)), over = wide_set(1.0f) / a;
+    const wide missed = wide_and(bent, _mm256_cmp_ps(discriminant, zero, _CMP_LT_OQ));
+    const wide near_t = _mm256_blendv_ps(wide_set(-1e30f), (-b - root) * over, bent);
+    const wide far_t = _mm256_blendv_ps(wide_set(1e30f), (root - b) * over, bent);
+    i->enter = wide_max(near_t, i->enter);
+    i->leave = _mm256_blendv_ps(wide_min(far_t, i->leave), wide_set(-2e30f), missed);
+}
+
+/* As shape_interval. */
+static inline void shape_lanes(uint32_t kind, float argument, const wide o[3], const wide d[3], float grow,
+                               wide_interval *i)
+{
+    const wide flat = d[0] * d[0] + d[1] * d[1], cross = o[0] * d[1] - o[1] * d[0], along = o[0] * d[0] + o[1] * d[1];
+    switch (kind) {
+    case PL_SHAPE_SPHERE: {
+        const wide a = flat + d[2] * d[2], r = wide_set(1.0f + grow);
+        const wide x = o[1] * d[2] - o[2] * d[1], y = o[2] * d[0] - o[0] * d[2];
+        quadric_lanes(i, a, along + o[2] * d[2], a * r * r - (x * x + y * y + cross * cross));
+        return;
+    }
+    case PL_SHAPE_DISC:
+    case PL_SHAPE_CYLINDER:
+    case PL_SHAPE_CONE: {
+        const wide r = wide_set((kind == PL_SHAPE_CONE && argument > 1.0f ? argument : 1.0f) + grow);
+        between_lanes(i, o[2], d[2], -grow, (kind == PL_SHAPE_DISC ? 0.0f : 1.0f) + grow);
+        quadric_lanes(i, flat, along, flat * r * r - cross * cross);
+        return;
+    }
+    case PL_SHAPE_TORUS: {
+        const float r = 1.0f + argument + grow, h = argument + grow;
+        between_lanes(i, o[0], d[0], -r, r);
+        between_lanes(i, o[1], d[1], -r, r);
+        between_lanes(i, o[2], d[2], -h, h);
+        return;
+    }
+    case PL_SHAPE_BOX:
+    case PL_SHAPE_TRIANGLE:
+    case PL_SHAPE_SQUARE:
+        between_lanes(i, o[0], d[0], -grow, 1.0f + grow);
+        between_lanes(i, o[1], d[1], -grow, 1.0f + grow);
+        between_lanes(i, o[2], d[2], -grow, (kind == PL_SHAPE_BOX ? 1.0f : 0.0f) + grow);
+        return;
+    default: return;
+    }
+}
+
+/* The rays of a packet's frame that can have a root in a primitive. */
+static inline unsigned filter_lanes(const pl_front_primitive *p, uint32_t kind, const pl_packet_frame *f, unsigned lanes)
+{
+    if (kind == PL_KIND_MESH || kind == PL_SHAPE_PLANE) return lanes;
+    const float margin = p->stretch * f->slack + 0x1p-19f, *m = p->columns;
+    unsigned found = 0;
+    for (int first = 0; first < PL_LANES; first += HALF) {
+        if (!(lanes >> first & 0xFF)) continue;
+        wide o[3], d[3];
+        const wide x = wide_load(f->origin[0] + first), y = wide_load(f->origin[1] + first);
+        const wide z = wide_load(f->origin[2] + first), u = wide_load(f->direction[0] + first);
+        const wide v = wide_load(f->direction[1] + first), w = wide_load(f->direction[2] + first);
+#pragma GCC unroll 3
+        for (int r = 0; r < 3; r++) {
+            o[r] = m[r] * x + m[3 + r] * y + (m[6 + r] * z + m[9 + r]);
+            d[r] = m[r] * u + m[3 + r] * v + m[6 + r] * w;
+        }
+        wide_interval i = {wide_set(-1e30f), wide_set(1e30f)};
+        shape_lanes(kind, p->argument, o, d, margin, &i);
+        const wide latest = wide_min(i.leave, wide_load(f->t_max + first));
+        const wide met = wide_and(_mm256_cmp_ps(i.enter, latest, _CMP_LE_OQ),
+                                  _mm256_cmp_ps(i.leave, wide_set(0.0f), _CMP_GE_OQ));
+        found |= wide_mask_of(met) << first;
+    }
+    return found & lanes;
+}

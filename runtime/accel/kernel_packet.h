@@ -1,0 +1,453 @@
+/* kernel_packet.h - the traversal of fronts by packets of PL_LANES rays that go about the same way (kernel.h has the single
+ * ray's; this is part of the kernels of x86).
+ *
+ * In nodes a packet is one *beam*: intervals of its origins and of its directions' inverses, so that a child is met or
+ * missed for all rays at once by about twice the arithmetic of one ray (interval arithmetic in packets: Boulos, Wald &
+ * Shirley 2006, "Geometric and arithmetic culling methods for entire ray packets"). At instances and primitives the rays are
+ * told apart, eight at a time. Where directions differ in sign, or few rays are left, these go on one by one.
+ *
+ * The same filters, wider: candidates are mapped down the path and evaluated as those of single rays are, so packets
+ * can't show in hits. */
+
+#include "kernel_lanes.h"
+
+/* As wide as this in the front's unit frame, rays are soon among different items. */
+#define WIDE 0.5f
+
+/* So few go on alone. */
+enum { FEW = 2 };
+
+/* --- frames --- */
+
+/* Widens intervals by the rays of some lanes. */
+static inline void span_of(const float *values, unsigned lanes, float *least, float *most)
+{
+    const wide a = wide_load(values), b = wide_load(values + HALF);
+    const wide in_a = wide_lanes(lanes & 0xFF), in_b = wide_lanes(lanes >> HALF);
+    const wide high = wide_set(INFINITY);
+    *least = wide_least(wide_min(_mm256_blendv_ps(high, a, in_a), _mm256_blendv_ps(high, b, in_b)));
+    *most = wide_most(wide_max(_mm256_blendv_ps(-high, a, in_a), _mm256_blendv_ps(-high, b, in_b)));
+}
+
+/* t_max of all rays in the frame's own t; *most: of its lanes. */
+static inline void set_t_max(pl_packet_frame *f, const double *t_max)
+{
+    for (int i = 0; i < PL_LANES; i += 4) {
+        const double4 t = (*(const double4 *)(t_max + i) - f->t0) * (f->rate * (1.0 + 0x1p-20)) + 1e-35;
+        const __m128 local = _mm256_cvtpd_ps((__m256d)t);
+        _mm_storeu_ps(f->t_max + i, _mm_min_ps(_mm_max_ps(local, _mm_set1_ps(1e-35f)), _mm_set1_ps(1e30f)));
+    }
+    const wide a = wide_and(wide_load(f->t_max), wide_lanes(f->lanes & 0xFF));
+    f->most = wide_most(wide_max(a, wide_and(wide_load(f->t_max + HALF), wide_lanes(f->lanes >> HALF))));
+}
+
+/* Single precision from double; the largest |o| and the range of |d| (sums of axes) in some lanes. */
+static inline void narrow(pl_packet_frame *f, unsigned lanes, float *far, float *slowest, float *fastest)
+{
+    float from[PL_LANES], speed[PL_LANES], least;
+    for (int i = 0; i < PL_LANES; i += 4) {
+        __m128 size = _mm_setzero_ps(), fast = _mm_setzero_ps();
+        for (int axis = 0; axis < 3; axis++) {
+            const __m128 o = _mm256_cvtpd_ps(_mm256_loadu_pd(f->o[axis] + i)), d = _mm256_cvtpd_ps(_mm256_loadu_pd(f->d[axis] + i));
+            _mm_storeu_ps(f->origin[axis] + i, o);
+            _mm_storeu_ps(f->direction[axis] + i, d);
+            size = _mm_add_ps(size, _mm_andnot_ps(_mm_set1_ps(-0.0f), o));
+            fast = _mm_add_ps(fast, _mm_andnot_ps(_mm_set1_ps(-0.0f), d));
+        }
+        _mm_storeu_ps(from + i, size);
+        _mm_storeu_ps(speed + i, fast);
+    }
+    span_of(from, lanes, &least, far);
+    span_of(speed, lanes, slowest, fastest);
+}
+
+/* Those of some lanes that meet the frame's box, and the first t at which one does. Sets inverses. */
+static inline unsigned lanes_in_box(pl_packet_frame *f, unsigned lanes, float *first_t)
+{
+    const pl_front *front = f->front;
+    unsigned met = 0;
+    wide least = wide_set(INFINITY);
+    for (int first = 0; first < PL_LANES; first += HALF) {
+        wide enter = wide_set(0.0f), leave = wide_load(f->t_max + first);
+#pragma GCC unroll 3
+        for (int axis = 0; axis < 3; axis++) {
+            const wide inverse = wide_inverse(wide_load(f->direction[axis] + first), 1e-18f);
+            const wide middle = wide_load(f->origin[axis] + first) * inverse;
+            const wide reach = (front->half[axis] + f->slack) * wide_absolute(inverse);
+            _mm256_storeu_ps(f->inverse[axis] + first, inverse);
+            enter = wide_max(-middle - reach, enter);
+            leave = wide_min(reach - middle, leave);
+        }
+        const wide in = wide_and(_mm256_cmp_ps(enter, leave, _CMP_LE_OQ), wide_lanes(lanes >> first & 0xFF));
+        least = wide_min(_mm256_blendv_ps(least, enter, in), least);
+        met |= wide_mask_of(in) << first;
+    }
+    *first_t = wide_least(least);
+    return met;
+}
+
+enum course { ASTRAY, AS_BEAM, ONE_BY_ONE };
+
+static inline float packet_slack(const pl_packet_frame *f, float far)
+{
+    return f->error + f->front->slack_gain * f->distance + f->front->slack_base + 0x1p-19f * (1.0f + far);
+}
+
+/* Begins a frame with the rays f->o and f->d of some lanes: which of them meet the box, and how they go on. */
+static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double *t_max)
+{
+    float far, slowest, fastest, first_t;
+    f->lanes = lanes;
+    if (f->front->root == PL_NOTHING) return ASTRAY;
+    narrow(f, lanes, &far, &slowest, &fastest);
+    if (!(slowest >= SLOW && fastest <= FAST)) return ONE_BY_ONE;
+    set_t_max(f, t_max);
+    f->slack = packet_slack(f, far);
+    if (!(f->slack < 1.0f)) return ONE_BY_ONE;
+    f->lanes = lanes_in_box(f, lanes, &first_t);
+    if (!f->lanes) return ASTRAY;
+    if (far > FAR) { /* all go on together to where the first of them enters */
+        f->t0 += (double)first_t / f->rate;
+        for (int axis = 0; axis < 3; axis++)
+            for (int i = 0; i < PL_LANES; i++) f->o[axis][i] += (double)first_t * f->d[axis][i];
+        f->error += 0x1p-49f * (f->distance + far);
+        narrow(f, f->lanes, &far, &slowest, &fastest);
+        if (!(far <= FAR)) return ONE_BY_ONE;
+        set_t_max(f, t_max);
+        f->slack = packet_slack(f, far);
+    }
+    return __builtin_popcount(f->lanes) <= FEW ? ONE_BY_ONE : AS_BEAM;
+}
+
+/* --- beams --- */
+
+/* What the loop keeps at hand. A plane's distances from the origins lie on one side of that from near_o or far_o, and t
+ * is extreme at one end of the inverses. */
+typedef struct beam {
+    wide near_o[3], far_o[3], least[3], most[3];
+    uint32_t near_row[3], far_row[3];
+} beam;
+
+/* false: the rays don't go the same way. */
+static inline bool look_along(beam *b, const pl_packet_frame *f)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        float o_least, o_most, least, most;
+        span_of(f->origin[axis], f->lanes, &o_least, &o_most);
+        span_of(f->inverse[axis], f->lanes, &least, &most);
+        const bool negative = most < 0.0f;
+        if (!negative && !(least > 0.0f)) return false;
+        if (o_most - o_least > WIDE) return false;
+        o_least -= f->slack;
+        o_most += f->slack;
+        b->near_o[axis] = wide_set(negative ? o_least : o_most);
+        b->far_o[axis] = wide_set(negative ? o_most : o_least);
+        b->least[axis] = wide_set(least);
+        b->most[axis] = wide_set(most);
+        b->near_row[axis] = (uint32_t)(negative ? 3 + axis : axis) * PL_FRONT_WIDTH;
+        b->far_row[axis] = (uint32_t)(negative ? axis : 3 + axis) * PL_FRONT_WIDTH;
+    }
+    return true;
+}
+
+/* As meet. */
+static inline unsigned meet_beam(const beam *b, float t_max, const pl_front_node *node, uint64_t *entries, pl_ref *nearest)
+{
+    wide enter = wide_set(0.0f), leave = wide_set(t_max);
+#pragma GCC unroll 3
+    for (int axis = 0; axis < 3; axis++) {
+        const wide near = wide_load(node->planes[0] + b->near_row[axis]) - b->near_o[axis];
+        const wide far = wide_load(node->planes[0] + b->far_row[axis]) - b->far_o[axis];
+        enter = wide_max(wide_min(near * b->least[axis], near * b->most[axis]), enter);
+        leave = wide_min(wide_max(far * b->least[axis], far * b->most[axis]), leave);
+    }
+    return wide_order(enter, leave, node->child, entries, nearest);
+}
+
+/* --- candidates --- */
+
+/* pl_map_ray for the rays of some quads, the same operations. */
+static inline void map_lanes(const pl_transform *transform, pl_lanes *rays, unsigned quads)
+{
+    const double *m = transform->to_object.m;
+    for (int i = 0; i < PL_LANES; i += 4) {
+        if (!(quads >> i / 4 & 1)) continue;
+        double4 *o[3], *d[3];
+        for (int axis = 0; axis < 3; axis++) {
+            o[axis] = (double4 *)(rays->o[axis] + i);
+            d[axis] = (double4 *)(rays->d[axis] + i);
+        }
+        if (transform->form == PL_FORM_GENERAL) {
+            const double4 x = *o[0], y = *o[1], z = *o[2], u = *d[0], v = *d[1], w = *d[2];
+            for (int r = 0; r < 3; r++) {
+                *o[r] = m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3];
+                *d[r] = m[4 * r] * u + m[4 * r + 1] * v + m[4 * r + 2] * w;
+            }
+            continue;
+        }
+        for (int axis = 0; axis < 3; axis++) {
+            if (transform->form == PL_FORM_DIAGONAL) {
+                *o[axis] *= m[5 * axis];
+                *d[axis] *= m[5 * axis];
+            }
+            *o[axis] += m[4 * axis + 3];
+        }
+    }
+}
+
+static inline bool map_lanes_down(pl_bvh_work *w, const pl_front *front, uint32_t opened, const pl_item *item,
+                                  pl_lanes *rays, unsigned quads, pl_error *error)
+{
+    size_t count;
+    if (!pl_bvh_chain(w, front, opened, &count, error)) return false;
+    while (count > 0) {
+        const pl_item *at = w->chain[--count];
+        for (uint32_t i = 0; i < at->transform_count; i++) map_lanes(at->transforms[i], rays, quads);
+    }
+    for (uint32_t i = 0; i < item->transform_count; i++) map_lanes(item->transforms[i], rays, quads);
+    return true;
+}
+
+/* The normative rays of some quads of a frame. */
+static bool map_packet(const pl_scene *scene, pl_bvh_work *w, uint32_t index, unsigned quads, pl_error *error)
+{
+    uint32_t from = index;
+    while (quads & ~w->packets[from].mapped) from--;
+    for (; from < index; from++) {
+        const pl_packet_frame *parent = &w->packets[from];
+        pl_packet_frame *f = &w->packets[from + 1];
+        const pl_front_instance *it = &parent->front->instances[f->instance];
+        for (int i = 0; i < PL_LANES; i += 4) {
+            if (!(quads >> i / 4 & 1)) continue;
+            for (int axis = 0; axis < 3; axis++) {
+                *(double4 *)(f->normative.o[axis] + i) = *(const double4 *)(parent->normative.o[axis] + i);
+                *(double4 *)(f->normative.d[axis] + i) = *(const double4 *)(parent->normative.d[axis] + i);
+            }
+        }
+        /* Quads that were mapped before are mapped again to the same numbers. */
+        if (!map_lanes_down(w, parent->front, it->opened,
+                            pl_front_item(&scene->states, parent->front, it->opened, it->item), &f->normative, quads, error))
+            return false;
+        f->mapped |= quads;
+    }
+    return true;
+}
+
+/* Evaluates a primitive of frame `index` for some lanes and offers it to their queries. */
+static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned lanes, pl_query *queries, double *t_max)
+{
+    pl_bvh_work *w = tracer->work;
+    const pl_scene *scene = tracer->scene;
+    const pl_front *front = w->packets[index].front;
+    const pl_front_primitive *p = &front->primitives[ref & PL_REF_INDEX];
+    const pl_item *item = pl_front_item(&scene->states, front, p->opened, p->item);
+    unsigned quads = 0;
+    for (int i = 0; i < QUADS; i++) quads |= (unsigned)((lanes >> 4 * i & 15) != 0) << i;
+    if (!map_packet(scene, w, index, quads, queries->error)) return false;
+    pl_lanes rays = w->packets[index].normative;
+    if (!map_lanes_down(w, front, p->opened, item, &rays, quads, queries->error)) return false;
+    wide_end();
+    for (; lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        const double o[3] = {rays.o[0][lane], rays.o[1][lane], rays.o[2][lane]};
+        const double d[3] = {rays.d[0][lane], rays.d[1][lane], rays.d[2][lane]};
+        if (!pl_bvh_offer(tracer, index, ref, item, o, d, &queries[lane])) return false;
+        t_max[lane] = queries[lane].t_max;
+    }
+    return true;
+}
+
+/* --- the loop --- */
+
+/* The rays of some lanes one by one through what lies below frame `index` of the packet. */
+static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max)
+{
+    pl_bvh_work *w = tracer->work;
+    const pl_packet_frame *from = &w->packets[index];
+    for (; lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        pl_frame *f = &w->frames[index];
+        float local_max = 1e30f;
+        for (uint32_t i = 0; i <= index; i++) w->frames[i].mapped = false;
+        f->front = from->front;
+        f->error = from->error;
+        f->distance = from->distance;
+        f->t0 = from->t0;
+        f->rate = from->rate;
+        const double4 o = {from->o[0][lane], from->o[1][lane], from->o[2][lane]};
+        const double4 d = {from->d[0][lane], from->d[1][lane], from->d[2][lane]};
+        f->blind = false;
+        local_max = local_t_max(f, t_max[lane]);
+        bool met = begin_frame(f, o, d, t_max[lane], &local_max);
+        if (!met && !f->front->unbounded_count) continue;
+        w->frames[0].mapped = true;
+        for (int axis = 0; axis < 3; axis++) {
+            w->frames[0].normative_o[axis] = w->packets[0].normative.o[axis][lane];
+            w->frames[0].normative_d[axis] = w->packets[0].normative.d[axis][lane];
+        }
+        if (!visit(tracer, &queries[lane], index, met, false)) return false;
+        t_max[lane] = queries[lane].t_max;
+    }
+    return true;
+}
+
+/* Goes into an instance: frame `index` + 1. */
+static inline void descend_lanes(pl_packet_frame *f, const pl_packet_frame *parent, const pl_front_instance *it)
+{
+    f->error = it->stretch * parent->error + (it->gain * parent->distance + it->base);
+    f->distance = it->stretch * parent->distance + it->offset;
+    f->t0 = parent->t0;
+    f->rate = parent->rate;
+    f->mapped = 0;
+    const double *m = it->columns;
+    for (int i = 0; i < PL_LANES; i += 4) {
+        const __m256d x = _mm256_loadu_pd(parent->o[0] + i), y = _mm256_loadu_pd(parent->o[1] + i), z = _mm256_loadu_pd(parent->o[2] + i);
+        const __m256d u = _mm256_loadu_pd(parent->d[0] + i), v = _mm256_loadu_pd(parent->d[1] + i), w = _mm256_loadu_pd(parent->d[2] + i);
+#pragma GCC unroll 3
+        for (int r = 0; r < 3; r++) {
+            const __m256d a = _mm256_set1_pd(m[r]), b = _mm256_set1_pd(m[3 + r]), c = _mm256_set1_pd(m[6 + r]);
+            _mm256_storeu_pd(f->o[r] + i, _mm256_fmadd_pd(a, x, _mm256_fmadd_pd(b, y, _mm256_fmadd_pd(c, z, _mm256_set1_pd(m[9 + r])))));
+            _mm256_storeu_pd(f->d[r] + i, _mm256_fmadd_pd(a, u, _mm256_fmadd_pd(b, v, c * w)));
+        }
+    }
+}
+
+/* A frame's unbounded primitives for some lanes; *all: there are unbounded instances, which only single rays go into. */
+static inline bool offer_unbounded(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, bool *all)
+{
+    pl_bvh_work *w = tracer->work;
+    const pl_front *front = w->packets[index].front;
+    *all = false;
+    for (uint32_t i = 0; i < front->unbounded_count; i++) *all = *all || front->unbounded[i] >> PL_REF_SHIFT == PL_KIND_INSTANCE;
+    if (*all) return visit_one_by_one(tracer, index, lanes, queries, t_max);
+    for (uint32_t i = 0; i < front->unbounded_count; i++)
+        if (!offer_lanes(tracer, index, front->unbounded[i], lanes, queries, t_max)) return false;
+    return true;
+}
+
+/* Begins frame `index` of the packet, whose rays are set; false in *beams: nothing is left to be done in it. */
+static inline bool enter_lanes(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, beam *b,
+                               bool *beams)
+{
+    pl_packet_frame *f = &((pl_bvh_work *)tracer->work)->packets[index];
+    bool done;
+    *beams = false;
+    if (f->front->unbounded_count) {
+        if (!offer_unbounded(tracer, index, lanes, queries, t_max, &done)) return false;
+        if (done) return true;
+    }
+    enum course course = begin_lanes(f, lanes, t_max);
+    if (course == AS_BEAM && !look_along(b, f)) course = ONE_BY_ONE;
+    *beams = course == AS_BEAM;
+    return course != ONE_BY_ONE || visit_one_by_one(tracer, index, f->lanes, queries, t_max);
+}
+
+static bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, double *t_max)
+{
+    pl_bvh_work *w = tracer->work;
+    const pl_fronts *fronts = tracer->scene->structure;
+    const bool shadow = queries->shadow;
+    pl_error *error = queries->error;
+    uint64_t steps = 0;
+    uint32_t index = 0;
+    size_t top = 0;
+    bool beams;
+    beam b;
+    if (!enter_lanes(tracer, 0, lanes, queries, t_max, &b, &beams)) return false;
+    if (!beams) return true;
+    pl_packet_frame *f = &w->packets[0];
+    uint64_t *stack = w->packet_stack;
+    stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
+    stack[top++] = entry_of(0.0f, f->front->root);
+    for (;;) {
+        const uint64_t at = stack[--top];
+        pl_ref ref = (pl_ref)at;
+        if (entry_is_beyond(at, f->most)) continue;
+        while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
+            const unsigned count = meet_beam(&b, f->most, &f->front->nodes[ref], stack + top, &ref);
+            steps++;
+            if (count == 0) goto next;
+            top += count - 1;
+            if (top + 16 > w->packet_stack_capacity) {
+                if (!pl_bvh_grow_packet_stack(w, top, error)) return false;
+                stack = w->packet_stack;
+            }
+        }
+        const uint32_t kind = ref >> PL_REF_SHIFT;
+        if (kind == PL_KIND_RETURN) {
+            if (index == 0) break;
+            f = &w->packets[--index];
+            set_t_max(f, t_max);
+            look_along(&b, f);
+        } else if (kind == PL_KIND_INSTANCE) {
+            const uint32_t instance = ref & PL_REF_INDEX;
+            const pl_front_instance *it = &f->front->instances[instance];
+            if (shadow && it->item & PL_NO_SHADOW) continue;
+            if (!pl_bvh_grow_packets(w, index + 1, error)) return false;
+            f = &w->packets[index];
+            pl_packet_frame *inner = f + 1;
+            inner->front = &fronts->list[it->front];
+            inner->instance = w->frames[index + 1].instance = instance;
+            w->frames[index + 1].front = inner->front;
+            tracer->counters.instances++;
+            descend_lanes(inner, f, it);
+            if (!enter_lanes(tracer, index + 1, f->lanes, queries, t_max, &b, &beams)) return false;
+            if (beams) {
+                f = &w->packets[++index];
+                stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
+                stack[top++] = entry_of(0.0f, f->front->root);
+            } else {
+                set_t_max(f, t_max);
+                look_along(&b, f);
+            }
+            if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
+        } else {
+            const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
+            if (shadow && p->item & PL_NO_SHADOW) continue;
+            tracer->counters.filtered++;
+            const unsigned found = filter_lanes(p, kind, f, f->lanes);
+            if (!found) continue;
+            if (!offer_lanes(tracer, index, ref, found, queries, t_max)) return false;
+            set_t_max(f, t_max);
+            if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
+        }
+    next:;
+    }
+    tracer->counters.box_tests += steps * PL_FRONT_WIDTH;
+    return true;
+}
+
+bool PACKET_KERNEL(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
+{
+    pl_bvh_work *w = tracer->work;
+    const pl_front *front = ((const pl_fronts *)tracer->scene->structure)->list;
+    if (!pl_bvh_grow_packets(w, 0, queries->error) || !pl_bvh_grow_packet_stack(w, 0, queries->error)) return false;
+    pl_packet_frame *root = &w->packets[0];
+    double t_max[PL_LANES], t0 = queries->t_min, distance = 0.0;
+    for (unsigned i = 1; i < count; i++) t0 = queries[i].t_min < t0 ? queries[i].t_min : t0;
+    for (unsigned lane = 0; lane < PL_LANES; lane++) {
+        const unsigned i = lane < count ? lane : 0;
+        double away = 0.0;
+        t_max[lane] = queries[i].t_max;
+        for (int axis = 0; axis < 3; axis++) {
+            const double o = rays[i].origin[axis], d = rays[i].direction[axis];
+            const double from = (o - front->centre[axis]) * front->scale;
+            root->normative.o[axis][lane] = o;
+            root->normative.d[axis][lane] = d;
+            root->d[axis][lane] = d * front->scale;
+            root->o[axis][lane] = from + t0 * root->d[axis][lane];
+            away += __builtin_fabs(from);
+        }
+        distance = away > distance ? away : distance;
+    }
+    root->front = w->frames[0].front = front;
+    root->instance = w->frames[0].instance = 0;
+    root->error = 0.0f;
+    root->distance = (float)distance * (1.0f + 0x1p-20f);
+    root->t0 = t0;
+    root->rate = 1.0;
+    root->mapped = (1u << QUADS) - 1;
+    const bool ok = visit_packet(tracer, (1u << count) - 1, queries, t_max);
+    wide_end();
+    return ok;
+}

@@ -1,0 +1,88 @@
+"""Packets: rays that go about the same way are traced together, and nobody can tell by the hits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from test_fronts import ALL, ROOT, SCENES, answers, assert_same, available
+
+from plsys.compiler import compile
+from plsys.runtime import PlsysRuntimeError, Scene
+from random_scenes import scenes
+
+SIDE = 12
+
+
+def middle(data: bytes) -> tuple[np.ndarray, float]:
+    """Where the primitives are: a point among them, and their extent."""
+    with Scene(data, accelerator="none") as scene:
+        places = [batch.matrix[batch.kind != 9][:, :, 3] for batch in scene.unfold()]
+    places = np.concatenate([*places, np.zeros((1, 3))])
+    return np.median(places, axis=0), 1.0 + float(np.ptp(places, axis=0).max())
+
+
+def bundles(data: bytes, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Small pictures from all around, tile by tile: narrow and wide, from one eye or from a surface; sixteen rays that are
+    neighbours lie together."""
+    random = np.random.default_rng(seed)
+    centre, size = middle(data)
+    tile = np.arange(SIDE * SIDE).reshape(SIDE // 4, 4, SIDE // 4, 4).transpose(0, 2, 1, 3).ravel()
+    across, up = (grid.ravel()[tile, None] / SIDE - 0.5 for grid in np.meshgrid(range(SIDE), range(SIDE)))
+    origins, directions = [], []
+    for width in (1e-3, 0.03, 0.3, 2.0):
+        for apart in (0.0, 0.01):
+            outward = random.normal(size=3)
+            eye = centre + outward * size * random.choice([0.05, 0.7, 20.0]) / np.linalg.norm(outward)
+            ahead = centre + random.uniform(-0.4, 0.4, 3) * size - eye
+            sideways = np.cross(ahead, random.normal(size=3))
+            sideways /= np.linalg.norm(sideways) / np.linalg.norm(ahead)
+            upward = np.cross(sideways, ahead) / np.linalg.norm(ahead)
+            spread = across * sideways + up * upward
+            origins.append(eye + apart * spread)
+            directions.append(ahead + width * spread)
+    return np.concatenate(origins), np.concatenate(directions)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_packets_do_not_show(name):
+    data = compile(ROOT / "scenes" / f"{name}.plsys", parameters=SCENES[name])
+    origins, directions = bundles(data, 3)
+    expected = answers(data, origins, directions, accelerator="boxes")
+    assert np.isfinite(expected["t"]).any()
+    for items in (1, 21, 256, ALL):
+        for isa in available(data):
+            assert_same(answers(data, origins, directions, front_items=items, isa=isa), expected, (items, isa))
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@given(text=scenes(), seed=st.integers(0, 2**32))
+def test_random_scenes_are_the_same_by_packets(text, seed):
+    data = compile(text)
+    origins, directions = bundles(data, seed)
+    expected = answers(data, origins, directions, accelerator="none")
+    for items in (1, ALL):
+        assert_same(answers(data, origins, directions, front_items=items), expected, items)
+
+
+def test_a_ray_that_is_refused_is_named_wherever_it_stands():
+    data = compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 4})
+    origins, directions = bundles(data, 1)
+    directions[37] = 0.0
+    with Scene(data) as scene, pytest.raises(PlsysRuntimeError, match="ray 37 is zero"):
+        scene.intersect(origins, directions)
+
+
+def test_packets_share_their_steps():
+    """Neighbours through a tree take fewer box tests together than each alone."""
+    data = compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 8})
+    origins, directions = bundles(data, 5)
+    narrow = slice(0, SIDE * SIDE)
+    tests = {}
+    for isa in available(data):
+        with Scene(data, isa=isa, threads=1, front_items=ALL) as scene:
+            scene.intersect(origins[narrow], directions[narrow])
+            tests[isa] = scene.statistics["box_tests"]
+    for isa, count in tests.items():
+        assert isa == "scalar" or count < 0.5 * tests["scalar"]
