@@ -72,7 +72,7 @@ bool pl_bvh_grow_packet_stack(pl_bvh_work *w, size_t top, pl_error *error)
 bool pl_bvh_chain(pl_bvh_work *w, const pl_front *front, uint32_t opened, size_t *count, pl_error *error)
 {
     size_t length = 0;
-    for (uint32_t at = front->opened[opened].moved; at; at = front->opened[front->opened[at].parent].moved) {
+    for (uint32_t at = opened; at; at = front->opened[at].moved) {
         if (length >= w->chain_capacity && !grow(&w->chain, length + 1, &w->chain_capacity, sizeof *w->chain, error))
             return false;
         w->chain[length++] = front->opened[at].item;
@@ -130,11 +130,11 @@ typedef struct place {
 static bool write_trail(const void *source, pl_path *trail)
 {
     const place *p = source;
-    uint32_t length = 0;
-    for (uint32_t i = 1; i <= p->frame; i++)
-        if (!pl_path_push(trail, length++, p->work->frames[i].instance)) return false;
-    if (!pl_path_push(trail, length++, p->ref)) return false;
-    trail->length = length;
+    while (trail->capacity <= p->frame)
+        if (!pl_path_push(trail, trail->capacity, 0)) return false;
+    for (uint32_t i = 0; i < p->frame; i++) trail->terms[i] = p->work->frames[i + 1].instance;
+    trail->terms[p->frame] = p->ref;
+    trail->length = p->frame + 1;
     return true;
 }
 

@@ -32,33 +32,45 @@ static inline void span_of(const float *values, unsigned lanes, float *least, fl
 /* t_max of all rays in the frame's own t; *most: of its lanes. */
 static inline void set_t_max(pl_packet_frame *f, const double *t_max)
 {
-    for (int i = 0; i < PL_LANES; i += 4) {
-        const double4 t = (*(const double4 *)(t_max + i) - f->t0) * (f->rate * (1.0 + 0x1p-20)) + 1e-35;
-        const __m128 local = _mm256_cvtpd_ps((__m256d)t);
-        _mm_storeu_ps(f->t_max + i, _mm_min_ps(_mm_max_ps(local, _mm_set1_ps(1e-35f)), _mm_set1_ps(1e30f)));
+    const __m256d from = _mm256_set1_pd(f->t0), rate = _mm256_set1_pd(f->rate * (1.0 + 0x1p-20));
+    wide most = wide_set(0.0f);
+    for (int first = 0; first < PL_LANES; first += HALF) {
+        const __m256d low = (_mm256_loadu_pd(t_max + first) - from) * rate, high = (_mm256_loadu_pd(t_max + first + 4) - from) * rate;
+        const wide t = wide_min(wide_max(wide_narrow(low, high), wide_set(1e-35f)), wide_set(1e30f));
+        _mm256_storeu_ps(f->t_max + first, t);
+        most = wide_max(wide_and(t, wide_lanes(f->lanes >> first & 0xFF)), most);
     }
-    const wide a = wide_and(wide_load(f->t_max), wide_lanes(f->lanes & 0xFF));
-    f->most = wide_most(wide_max(a, wide_and(wide_load(f->t_max + HALF), wide_lanes(f->lanes >> HALF))));
+    f->most = wide_most(most);
 }
 
-/* Single precision from double; the largest |o| and the range of |d| (sums of axes) in some lanes. */
-static inline void narrow(pl_packet_frame *f, unsigned lanes, float *far, float *slowest, float *fastest)
+/* Single precision from double; the largest |o| and the range of |d| (sums of axes) in some lanes. false: some aren't
+ * finite. */
+static inline bool narrow(pl_packet_frame *f, unsigned lanes, float *far, float *slowest, float *fastest)
 {
-    float from[PL_LANES], speed[PL_LANES], least;
-    for (int i = 0; i < PL_LANES; i += 4) {
-        __m128 size = _mm_setzero_ps(), fast = _mm_setzero_ps();
+    unsigned finite = 0;
+    wide farthest = wide_set(0.0f), least = wide_set(INFINITY), most = wide_set(0.0f);
+    for (int first = 0; first < PL_LANES; first += HALF) {
+        wide away = wide_set(0.0f), fast = wide_set(0.0f);
+#pragma GCC unroll 3
         for (int axis = 0; axis < 3; axis++) {
-            const __m128 o = _mm256_cvtpd_ps(_mm256_loadu_pd(f->o[axis] + i)), d = _mm256_cvtpd_ps(_mm256_loadu_pd(f->d[axis] + i));
-            _mm_storeu_ps(f->origin[axis] + i, o);
-            _mm_storeu_ps(f->direction[axis] + i, d);
-            size = _mm_add_ps(size, _mm_andnot_ps(_mm_set1_ps(-0.0f), o));
-            fast = _mm_add_ps(fast, _mm_andnot_ps(_mm_set1_ps(-0.0f), d));
+            const double *from = f->o[axis] + first, *along = f->d[axis] + first;
+            const wide o = wide_narrow(_mm256_loadu_pd(from), _mm256_loadu_pd(from + 4));
+            const wide d = wide_narrow(_mm256_loadu_pd(along), _mm256_loadu_pd(along + 4));
+            _mm256_storeu_ps(f->origin[axis] + first, o);
+            _mm256_storeu_ps(f->direction[axis] + first, d);
+            away += wide_absolute(o);
+            fast += wide_absolute(d);
         }
-        _mm_storeu_ps(from + i, size);
-        _mm_storeu_ps(speed + i, fast);
+        const wide in = wide_lanes(lanes >> first & 0xFF);
+        farthest = wide_max(wide_and(away, in), farthest);
+        least = wide_min(_mm256_blendv_ps(least, fast, in), least);
+        most = wide_max(wide_and(fast, in), most);
+        finite |= wide_mask_of(_mm256_cmp_ps(away + fast, wide_set(INFINITY), _CMP_LT_OQ)) << first;
     }
-    span_of(from, lanes, &least, far);
-    span_of(speed, lanes, slowest, fastest);
+    *far = wide_most(farthest);
+    *slowest = wide_least(least);
+    *fastest = wide_most(most);
+    return !(lanes & ~finite);
 }
 
 /* Those of some lanes that meet the frame's box, and the first t at which one does. Sets inverses. */
@@ -99,8 +111,7 @@ static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double 
     float far, slowest, fastest, first_t;
     f->lanes = lanes;
     if (f->front->root == PL_NOTHING) return ASTRAY;
-    narrow(f, lanes, &far, &slowest, &fastest);
-    if (!(slowest >= SLOW && fastest <= FAST)) return ONE_BY_ONE;
+    if (!narrow(f, lanes, &far, &slowest, &fastest) || !(slowest >= SLOW && fastest <= FAST)) return ONE_BY_ONE;
     set_t_max(f, t_max);
     f->slack = packet_slack(f, far);
     if (!(f->slack < 1.0f)) return ONE_BY_ONE;
@@ -111,8 +122,7 @@ static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double 
         for (int axis = 0; axis < 3; axis++)
             for (int i = 0; i < PL_LANES; i++) f->o[axis][i] += (double)first_t * f->d[axis][i];
         f->error += 0x1p-49f * (f->distance + far);
-        narrow(f, f->lanes, &far, &slowest, &fastest);
-        if (!(far <= FAR)) return ONE_BY_ONE;
+        if (!narrow(f, f->lanes, &far, &slowest, &fastest) || !(far <= FAR)) return ONE_BY_ONE;
         set_t_max(f, t_max);
         f->slack = packet_slack(f, far);
     }
@@ -195,6 +205,17 @@ static inline void map_lanes(const pl_transform *transform, pl_lanes *rays, unsi
     }
 }
 
+static inline void copy_quads(pl_lanes *to, const pl_lanes *from, unsigned quads)
+{
+    for (int i = 0; i < PL_LANES; i += 4) {
+        if (!(quads >> i / 4 & 1)) continue;
+        for (int axis = 0; axis < 3; axis++) {
+            *(double4 *)(to->o[axis] + i) = *(const double4 *)(from->o[axis] + i);
+            *(double4 *)(to->d[axis] + i) = *(const double4 *)(from->d[axis] + i);
+        }
+    }
+}
+
 static inline bool map_lanes_down(pl_bvh_work *w, const pl_front *front, uint32_t opened, const pl_item *item,
                                   pl_lanes *rays, unsigned quads, pl_error *error)
 {
@@ -217,13 +238,7 @@ static bool map_packet(const pl_scene *scene, pl_bvh_work *w, uint32_t index, un
         const pl_packet_frame *parent = &w->packets[from];
         pl_packet_frame *f = &w->packets[from + 1];
         const pl_front_instance *it = &parent->front->instances[f->instance];
-        for (int i = 0; i < PL_LANES; i += 4) {
-            if (!(quads >> i / 4 & 1)) continue;
-            for (int axis = 0; axis < 3; axis++) {
-                *(double4 *)(f->normative.o[axis] + i) = *(const double4 *)(parent->normative.o[axis] + i);
-                *(double4 *)(f->normative.d[axis] + i) = *(const double4 *)(parent->normative.d[axis] + i);
-            }
-        }
+        copy_quads(&f->normative, &parent->normative, quads);
         /* Quads that were mapped before are mapped again to the same numbers. */
         if (!map_lanes_down(w, parent->front, it->opened,
                             pl_front_item(&scene->states, parent->front, it->opened, it->item), &f->normative, quads, error))
@@ -244,7 +259,8 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     unsigned quads = 0;
     for (int i = 0; i < QUADS; i++) quads |= (unsigned)((lanes >> 4 * i & 15) != 0) << i;
     if (!map_packet(scene, w, index, quads, queries->error)) return false;
-    pl_lanes rays = w->packets[index].normative;
+    pl_lanes rays;
+    copy_quads(&rays, &w->packets[index].normative, quads);
     if (!map_lanes_down(w, front, p->opened, item, &rays, quads, queries->error)) return false;
     wide_end();
     for (; lanes; lanes &= lanes - 1) {

@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "../error.h"
 
@@ -55,6 +56,17 @@ static void set_hit(pl_hit *hit, const pl_leaf *leaf, const pl_root *root)
     hit->bound = leaf->cut_depth ? leaf->bound : NAN;
 }
 
+/* nextafter(t, INFINITY), a call less where t is an ordinary number. */
+static inline double just_beyond(double t)
+{
+    uint64_t bits;
+    if (!(t > 0.0 && t < INFINITY)) return nextafter(t, INFINITY);
+    memcpy(&bits, &t, sizeof bits);
+    bits++;
+    memcpy(&t, &bits, sizeof t);
+    return t;
+}
+
 static bool keep_nearest(pl_query *query, const pl_leaf *leaf, const pl_root *root)
 {
     pl_hit *hit = query->hit;
@@ -67,7 +79,7 @@ static bool keep_nearest(pl_query *query, const pl_leaf *leaf, const pl_root *ro
         return pl_fail_memory(query->error, "tracing a ray");
     set_hit(hit, leaf, root);
     /* Just beyond, so that others at the same t are still compared; never beyond what was asked for. */
-    double beyond = nextafter(root->t, INFINITY);
+    double beyond = just_beyond(root->t);
     if (beyond < query->t_max) query->t_max = beyond;
     return true;
 }
