@@ -56,6 +56,9 @@ EMACS = {
 # Patterns that an editor's vocabulary has no word for.
 DROPPED = {"helix": ("indent.end", "indent.ignore")}
 
+# Where what is special stands after what is general, editors have to be told.
+NOTES = {("emacs", "highlights"): "; For treesit-font-lock-rules with :override t: the last pattern that fits a name counts.\n\n"}
+
 EDITORS = {
     "neovim": (NEOVIM, ("highlights", "folds", "indents", "locals")),
     "helix": (HELIX, ("highlights", "indents", "locals")),
@@ -65,15 +68,17 @@ EDITORS = {
 _CAPTURE = re.compile(r"@([a-z][\w.]*)")
 
 
-def outputs() -> dict[Path, str]:
-    """Every editor's query files with their texts."""
+def outputs(current: dict[str, str]) -> dict[Path, str]:
+    """Every editor's query files with their texts. ``current`` has the texts of queries that aren't written yet."""
     found = {}
     for editor, (names, files) in EDITORS.items():
         for file in files:
             path = QUERIES / f"{file}.scm"
-            text = translated(path.read_text(encoding="utf-8"), names, DROPPED.get(editor, ()))
+            text = current.get(path.name) or path.read_text(encoding="utf-8")
+            text = translated(text, names, DROPPED.get(editor, ()))
             text = for_emacs(text) if editor == "emacs" else text
-            found[QUERIES / editor / f"{file}.scm"] = HEAD.format(name=path.name) + text
+            note = NOTES.get((editor, file), "")
+            found[QUERIES / editor / f"{file}.scm"] = HEAD.format(name=path.name) + note + text
     return found
 
 

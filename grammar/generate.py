@@ -44,6 +44,8 @@ HIGHLIGHTS = (
     ("@type.builtin", ("primitive", "block")),
     ("@property.builtin", ("property", "modifier", "colourword")),
 )
+# Properties mean something in blocks only: elsewhere a parameter may be called `angle`, and `scale` is an operation.
+IN_BLOCKS = "[(block_body (name) {}) (map_entry (name) {}) (declare value: (name) {})]"
 
 
 def load(path: Path = HERE / "vocabulary.toml") -> dict:
@@ -133,12 +135,11 @@ def highlights(table: dict, current: str) -> str:
     """``current``, the text of highlights.scm, with the lists between the markers renewed."""
     lines = [BEGIN]
     for capture, kinds in HIGHLIGHTS:
-        names: list[str] = []
-        for kind in kinds:
-            groups = table[kind].values() if kind == "property" else (table[kind],)
-            names += [name for group in groups for name in group if name not in names]
+        groups = [group for kind in kinds for group in (table[kind].values() if kind == "property" else (table[kind],))]
+        names = dict.fromkeys(name for group in groups for name in group)
+        place = "(name) {}" if "property" not in kinds else IN_BLOCKS
         lines += [
-            f"((name) {capture}",
+            f"({place.replace('{}', capture)}",
             f"  (#any-of? {capture}",
             *(f'    "{name}"' for name in names),
             "  ))",
@@ -159,7 +160,7 @@ def outputs() -> dict[Path, str]:
     queries = HERE / "queries/highlights.scm"
     if queries.exists():
         files[queries] = highlights(table, queries.read_text(encoding="utf-8"))
-    return files | editor_queries.outputs()
+    return files | editor_queries.outputs({path.name: text for path, text in files.items() if path == queries})
 
 
 def main(arguments: list[str]) -> int:

@@ -111,7 +111,7 @@
     "finish"
     "color_map"
   ))
-((name) @property.builtin
+([(block_body (name) @property.builtin) (map_entry (name) @property.builtin) (declare value: (name) @property.builtin)]
   (#any-of? @property.builtin
     "assumed_gamma"
     "max_trace_level"
@@ -127,7 +127,6 @@
     "look_at"
     "angle"
     "perspective"
-    "color"
     "parallel"
     "spotlight"
     "shadowless"
@@ -137,7 +136,6 @@
     "tightness"
     "fade_distance"
     "fade_power"
-    "color"
     "checker"
     "gradient"
     "color_map"

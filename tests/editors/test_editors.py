@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from plsys.compiler.reading import grammar
+
 HERE = Path(__file__).resolve().parent
 SERVER = f"{sys.executable} -m plsys.compiler.cli lsp"
 SCENE = """\
@@ -19,16 +21,23 @@ Selection Tree { Tree -> T_up cylinder; }
 Transformation T_up { trans 0 0 1; }
 """
 TIMEOUT_S = 90
+ROOT = HERE.parents[1]
+# How Neovim shows words of scenes/tree.plsys at their first place.
+SEEN = {
+    "camera": "type.builtin", "location": "property", "#declare": "keyword.directive", "Bark": "constant", "Parameter": "keyword",
+    "order": "constant", "Selection": "keyword", "Tree": "property", "if": "keyword.conditional", "cylinder": "type.builtin",
+    "scale": "function.builtin", "Calculation": "keyword", "C_initialize": "variable", "betaBr": "variable", "0": "number",
+}  # fmt: skip
 # pip's Neovim stands beside the interpreter, Debian's in /usr/bin.
 NEOVIMS = {"0.11": Path(sys.executable).with_name("nvim"), "0.7": Path("/usr/bin/nvim")}
 
 
-def run(command: list[str], folder: Path) -> dict:
+def run(command: list[str], folder: Path, **more: str) -> dict:
     """What the editor's script prints: JSON on the last line."""
     scene = folder / "scene.plsys"
     scene.write_text(SCENE)
     environment = {
-        **os.environ, "PLSYS_SERVER": SERVER, "PLSYS_SCENE": str(scene), "HOME": str(folder), "XDG_CONFIG_HOME": str(folder),
+        **os.environ, **more, "PLSYS_SERVER": SERVER, "PLSYS_SCENE": str(scene), "HOME": str(folder), "XDG_CONFIG_HOME": str(folder),
         "XDG_DATA_HOME": str(folder), "XDG_STATE_HOME": str(folder), "TERM": "dumb",
     }  # fmt: skip
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=TIMEOUT_S, stdin=subprocess.DEVNULL)
@@ -57,6 +66,28 @@ def test_neovim(version, tmp_path):
     script = f"luafile {HERE / 'session.lua'}"
     result = run([str(program), "--headless", "-u", "NONE", "--cmd", "set noswapfile", "-c", script], tmp_path)
     check(result)
+
+
+def test_neovim_highlights_and_folds(tmp_path):
+    """The grammar and its queries as Neovim itself uses them, without a language server."""
+    program = NEOVIMS["0.11"]
+    if not program.exists():
+        pytest.skip("Neovim 0.11 isn't installed: see tests/editors/README.md")
+    (tmp_path / "parser").mkdir()
+    shutil.copy(next(Path(grammar.__file__).parents[1].glob("libgrammar.*")), tmp_path / "parser/plsys.so")
+    shutil.copytree(ROOT / "grammar/queries/neovim", tmp_path / "queries/plsys")
+    scenes = sorted((ROOT / "scenes").glob("*.plsys"))
+    script = f"luafile {HERE / 'highlight.lua'}"
+    command = [str(program), "--headless", "-u", "NONE", "--cmd", "set noswapfile", "-c", script]
+    names = "\n".join(map(str, [ROOT / "scenes/tree.plsys", *scenes]))
+    result = run(command, tmp_path, PLSYS_RUNTIME=str(tmp_path), PLSYS_SCENES=names)
+    assert {"indent.begin", "indent.branch"} <= set(result["queries"]["indents"])
+    assert len(result["scenes"]) == len(scenes) + 1
+    for scene in result["scenes"]:
+        assert [word for word, capture in scene["words"] if not capture] == []
+    assert max(result["scenes"][0]["folds"]) >= 1
+    seen = {word: capture for word, capture in reversed(result["scenes"][0]["words"])}
+    assert {word: seen[word] for word in SEEN} == SEEN
 
 
 def test_emacs(tmp_path):

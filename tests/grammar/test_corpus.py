@@ -131,5 +131,41 @@ def test_highlights_use_the_editors_words(editor, words):
 
 def test_emacs_captures_are_faces():
     text = (GRAMMAR / "queries/emacs/highlights.scm").read_text()
-    assert all(re.fullmatch(r"@font-lock-[a-z-]+-face", name) for name in re.findall(r"@[\w.-]+", text))
+    # The elisp manual, "Faces for Font Lock" (Emacs 29).
+    faces = (
+        "warning doc doc-markup comment comment-delimiter string keyword builtin preprocessor function-name function-call variable-name"
+        " variable-use type constant number operator property-name property-use punctuation bracket delimiter misc-punctuation"
+        " negation-char escape regexp"
+    ).split()
+    assert set(re.findall(r"@[\w.-]+", text)) <= {f"@font-lock-{face}-face" for face in faces}
     assert "#any-of" not in text and "#eq?" not in text
+
+
+@pytest.mark.parametrize("path", [path for path in QUERIES if path.stem == "highlights"], ids=lambda path: path.parent.name)
+def test_every_name_of_every_scene_has_a_colour(path: Path) -> None:
+    """Also where a word has two meanings, the last pattern that fits knows which: properties are in blocks only."""
+    from tree_sitter import Query, QueryCursor
+
+    text = re.sub(r'\(#match "\^\\\\\(\?:(.*?)\\\\\)\$" (@[\w-]+)\)', in_words, path.read_text())
+    query = Query(language(), text.replace("#equal", "#eq?"))
+    for scene in (GRAMMAR.parent / "scenes").glob("*.plsys"):
+        root = syntax_tree(scene.read_bytes()).root_node
+        last: dict[int, tuple[int, str]] = {}
+        for pattern, captures in QueryCursor(query).matches(root):
+            for name, nodes in captures.items():
+                for node in nodes:
+                    last[node.id] = max(last.get(node.id, (-1, "")), (pattern, name))
+        waiting, operations = [root], set()
+        while waiting:
+            node = waiting.pop()
+            waiting += node.children
+            if node.type == "name":
+                assert node.id in last, node.text
+            if node.type == "operation" and (name := node.child_by_field_name("name")) is not None:
+                operations.add(last[name.id][1])
+        assert len(operations) <= 1 and not operations & {"property", "variable.other.member", "font-lock-property-name-face"}
+
+
+def in_words(match: re.Match[str]) -> str:
+    words = " ".join(f'"{word}"' for word in match[1].split(r"\\|"))
+    return f"(#any-of? {match[2]} {words})"

@@ -113,7 +113,7 @@
     "finish"
     "color_map"
   ))
-((name) @variable.other.member
+([(block_body (name) @variable.other.member) (map_entry (name) @variable.other.member) (declare value: (name) @variable.other.member)]
   (#any-of? @variable.other.member
     "assumed_gamma"
     "max_trace_level"
@@ -129,7 +129,6 @@
     "look_at"
     "angle"
     "perspective"
-    "color"
     "parallel"
     "spotlight"
     "shadowless"
@@ -139,7 +138,6 @@
     "tightness"
     "fade_distance"
     "fade_power"
-    "color"
     "checker"
     "gradient"
     "color_map"

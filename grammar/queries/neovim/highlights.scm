@@ -113,7 +113,7 @@
     "finish"
     "color_map"
   ))
-((name) @property
+([(block_body (name) @property) (map_entry (name) @property) (declare value: (name) @property)]
   (#any-of? @property
     "assumed_gamma"
     "max_trace_level"
@@ -129,7 +129,6 @@
     "look_at"
     "angle"
     "perspective"
-    "color"
     "parallel"
     "spotlight"
     "shadowless"
@@ -139,7 +138,6 @@
     "tightness"
     "fade_distance"
     "fade_power"
-    "color"
     "checker"
     "gradient"
     "color_map"
