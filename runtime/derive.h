@@ -23,7 +23,6 @@
 #include "trace.h"
 
 enum {
-    PL_LIMIT_DEPTH = 1 << 18, /* symbols entered on one path */
     PL_PAYLOAD = 12,
     PL_NOWHERE = -1
 };

@@ -25,7 +25,7 @@ from . import queries
 from .actions import Action, TextEdit
 from .document import Document, Meaning, Message, Outline, Place
 from .facts import Definition, Facts, Name, facts_of
-from .fixes import fixes, ignoring
+from .fixes import fix_all, fixes, ignoring
 from .format import Formatted, format_document
 from .insights import GuardInsight, Insight, SymbolInsight, ValueInsight, insights_in, insights_of
 from .motion import Motion, constant_of, motion_of
@@ -39,6 +39,6 @@ from .whole import run as check_whole
 __all__ = [
     "Action", "Block", "CODES", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Formatted",
     "GuardInsight", "Insight", "Meaning", "Message", "Motion", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
-    "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "facts_of", "fixes",
+    "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "facts_of", "fix_all", "fixes",
     "format_document", "ignoring", "insights_in", "insights_of", "motion_of", "nearest", "queries", "refactorings", "syntax", "vocabulary",
 ]  # fmt: skip

@@ -1,7 +1,7 @@
 """Quick fixes: a diagnostic → what to do about it, by its code.
 
 :data:`FIXES` is the registry. A row is a pattern that the message (or its hint) has, and a function that makes the
-action; one code may have several. What every message with a certain hint gets ("did you mean …?", "remove it") stands
+action; one code may have several. A message that brings its mend along needs no row. What every message with a certain hint gets ("did you mean …?", "remove it") stands
 in :data:`BY_HINT`.
 
 Example: ``fixes(scene, document, message)`` of "missing ';' after this rule" is ``[Action("Add ';'", …)]``.
@@ -18,6 +18,14 @@ from .document import Document, Message
 from .fixes_scene import SCENE_FIXES
 from .fixes_text import HINT_FIXES, TEXT_FIXES, short
 from .scene import Scene
+
+# Messages whose first fix is right whatever was meant.
+SURE = re.compile(
+    r"^missing: missing '(?:;|->|=)'|^assignment-in-condition:"
+    r"|^syntax: .*(?:stands where a rule has|stands where a range has|written as two words|condition stands in brackets"
+    r"|(?:ends|closes|separates) nothing|can't stand in a scene block|a vector stands in|arguments stand without brackets"
+    r"|a space stands between a function)"
+)
 
 Found = tuple[str, list[TextEdit]] | None
 Fix = Callable[[Spot, re.Match, Message], Found]
@@ -47,6 +55,24 @@ def fixes(scene: Scene, document: Document, message: Message) -> Iterator[Action
             seen.add(tuple(made[1]))
             yield Action(made[0], "quickfix", tuple(made[1]), preferred, message)
             preferred = False
+
+
+def fix_all(scene: Scene, document: Document) -> Iterator[Action]:
+    """The one action that does what is sure about all messages; none where nothing is."""
+    edits: list[TextEdit] = []
+    for message in scene.messages(document):
+        found = message.diagnostic
+        if found.mend is None and not SURE.search(f"{found.code}: {found.message}"):
+            continue
+        first = next(fixes(scene, document, message), None)
+        if first is not None and not any(_touch(new, old) for new in first.edits for old in edits):
+            edits += first.edits
+    if edits:
+        yield Action("Fix all that is sure", "source.fixAll", tuple(edits))
+
+
+def _touch(first: TextEdit, second: TextEdit) -> bool:
+    return first.document is second.document and first.start <= second.end and second.start <= first.end
 
 
 def _mended(spot: Spot, mend: str, message: Message) -> Action:

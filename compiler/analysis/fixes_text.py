@@ -156,7 +156,7 @@ def short(text: str) -> str:
     return line if line == text and len(line) <= 40 else line[:37] + "…"
 
 
-_WRITE = r"^.*(?:lacks a digit|is no operator|this dash|quotation mark|takes no arguments|ends with its Selection's name|left side takes)"
+_WRITE = r"^.*(?:lacks a digit|(?<!\^' )is no operator|this dash|quotation mark|takes no arguments|ends with its Selection's name|left side takes)"
 
 TEXT_FIXES = {
     "syntax": (
@@ -172,7 +172,6 @@ TEXT_FIXES = {
         (r"a space stands between a function and its bracket", closed_up_call),
         (r"this alternative has no weight", insert("1: ")),
         (r"nothing stands after this '\+'|an alternative is missing after this", remove),
-        (r"'\^' is no operator", lambda *_: None),
         (_WRITE, write_hint),
     ),
     "missing": (
@@ -190,7 +189,6 @@ TEXT_FIXES = {
     ),
     "encoding": ((r"NUL byte|not UTF-8", remove),),
     "wrong-arguments": (
-        (r"this alternative has no weight", insert("1: ")),
         (_WRITE, write_hint),
     ),
     "unsupported": ((r"^#local isn't", replace("#declare")),),

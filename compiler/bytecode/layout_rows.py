@@ -238,6 +238,7 @@ RANDOM = {
 
 LIMITS = {
     "stack": 64,
+    "depth": 262144,
     "draws_per_application": 64,
     "hash_arguments": 16,
     "bytes": 1073741824,

@@ -14,6 +14,10 @@ from dataclasses import dataclass, field
 from .states import Formula, State
 
 
+# Lengths of a path at which to see whether it has an end.
+LOOKED_AT = frozenset(2**i for i in range(8, 20))
+
+
 class Stopped(Exception):
     """Raised by ``expand`` or a limit to end the exploration."""
 
@@ -30,22 +34,31 @@ class Exploration:
 
 
 def explore(
-    starts: Iterable[State], expand: Callable[[State], Formula], max_states: int, max_depth: int
+    starts: Iterable[State],
+    expand: Callable[[State], Formula],
+    max_states: int,
+    max_depth: int,
+    runs_away: Callable[[list[State]], bool] | None = None,
 ) -> Exploration:
     """Every state that ``starts`` lead to, unless a limit stops the exploration: so many states beside the path to
-    the one at hand, or so long a path."""
+    the one at hand, or so long a path. ``runs_away`` may know of a path that it will be as long."""
     found = Exploration()
     try:
         for start in starts:
             if start not in found.formulas:
-                _search(start, expand, found, max_states, max_depth)
+                _search(start, expand, found, max_states, max_depth, runs_away)
     except Stopped:
         found.complete = False
     return found
 
 
 def _search(
-    start: State, expand: Callable[[State], Formula], found: Exploration, max_states: int, max_depth: int
+    start: State,
+    expand: Callable[[State], Formula],
+    found: Exploration,
+    max_states: int,
+    max_depth: int,
+    runs_away: Callable[[list[State]], bool] | None,
 ) -> None:
     number = found.numbers
     lowest: dict[State, int] = {}
@@ -56,7 +69,10 @@ def _search(
     def visit(state: State) -> None:
         # States on the path itself don't count as many: one long recursion isn't an explosion.
         beside = len(number) - len(path)
-        for limit, reached in (("depth", len(path) >= max_depth), ("states", beside >= max_states)):
+        is_long = len(path) >= max_depth
+        if runs_away is not None and len(path) in LOOKED_AT:
+            is_long = is_long or runs_away([s for s, _ in path])
+        for limit, reached in (("depth", is_long), ("states", beside >= max_states)):
             if reached:
                 found.limit, found.path = limit, [s for s, _ in path]
                 raise Stopped

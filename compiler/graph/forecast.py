@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from decimal import Decimal
 
+from ..bytecode.layout_rows import LIMITS
 from ..reading.diagnostics import Diagnostics
 from ..reading.source import Span
 from . import graph as g
@@ -23,10 +24,11 @@ from .contraction import contracts
 from .count import Count, count, expected, least, most
 from .explore import Exploration, explore
 from .passes.liveness import draw_sets, live_sets
+from .runaway import runs_away
 from .states import Derivation, DerivationError, Formula, State, objects_of
 
 MAX_STATES = 50_000
-MAX_DEPTH = 100_000
+MAX_DEPTH = LIMITS["depth"]  # the runtime follows no path farther
 MAX_ERRORS = 20
 PROOF_STATES = 2000
 
@@ -68,7 +70,7 @@ class _Forecaster:
     def run(self) -> Forecast:
         result = self.result
         starts = self.starts(self.derivation)
-        found = explore(starts, self.expand, self.max_states, self.max_depth)
+        found = explore(starts, self.expand, self.max_states, self.max_depth, self.runs_away)
         if not found.complete:
             self.report_limit(found)
         endless = self.report_cycles(found)
@@ -81,9 +83,8 @@ class _Forecaster:
             result.primitives, result.primitives_range, result.by_kind = None, (None, None, None), {}
             if not endless:
                 # After a path without end seen, only a proof of it is worth looking for.
-                self.count_chances(
-                    min(self.max_states, PROOF_STATES) if found.limit == "depth" else self.max_states
-                )
+                proof = (min(self.max_states, PROOF_STATES), min(self.max_depth, PROOF_STATES))
+                self.count_chances(*(proof if found.limit == "depth" else (self.max_states, self.max_depth)))
         self.report_expansion(result)
         result.infinite = bool(found.cyclic) and not self.diagnostics.has_errors
         result.diagnostics = self.diagnostics.sorted()
@@ -110,6 +111,9 @@ class _Forecaster:
         except DerivationError as error:
             self.report(error)
             return Formula()
+
+    def runs_away(self, path: list[State]) -> bool:
+        return runs_away(self.graph, path, self.max_depth)
 
     def report(self, error: DerivationError) -> None:
         self.tell(error.code, error.span, error.message)
@@ -191,12 +195,12 @@ class _Forecaster:
         result.by_kind = {kind: _total(count(found, kind, most), starts) for kind in self.kinds(found)}
         result.primitives_range = (result.primitives,) * 3
 
-    def count_chances(self, max_states: int) -> None:
+    def count_chances(self, max_states: int, max_depth: int) -> None:
         """Bounds and, where they differ, the expectation."""
         result = self.result
         bounds = Chances(self.graph, uniform=False)
         starts = self.starts(bounds)
-        found = explore(starts, bounds.expand, max_states, self.max_depth)
+        found = explore(starts, bounds.expand, max_states, max_depth)
         if not found.complete:
             return
         low, high = (_total(count(found, "", choose), starts) for choose in (least, most))

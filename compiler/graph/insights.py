@@ -21,6 +21,7 @@ from .lower import lower
 from .observe import Either, Entered, Item, Noted, Observer, Site, Trace, flat
 from .passes.dead import dead_parameters
 from .ranges import Range, Value
+from .runaway import runs_away
 from .states import State, objects_of
 
 MAX_STATES = 20_000
@@ -43,7 +44,13 @@ class _Observation:
         self.graph, self.purpose, self.max_states = graph, purpose, max_states
         observer = Observer(graph, purpose=purpose)
         self.roots = [observer.start(node) for node in objects_of(graph)]
-        self.found: Exploration = explore(_states(self.roots), observer.expand, max_states, MAX_DEPTH)
+        self.found: Exploration = explore(
+            _states(self.roots),
+            observer.expand,
+            max_states,
+            MAX_DEPTH,
+            lambda path: runs_away(graph, path, MAX_DEPTH, observer.order),
+        )
 
     def insights(self) -> Insights:
         self.cyclic = {state for i in self.found.cyclic for state in self.found.components[i]}

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any, Iterator
 
-from plsys.compiler.analysis import Action, Message, fixes, ignoring, refactorings
+from plsys.compiler.analysis import Action, Message, fix_all, fixes, ignoring, refactorings
 from plsys.lsp.request import Feature, Request
 
-KINDS = ("quickfix", "refactor.extract", "refactor.inline", "refactor.rewrite")
+KINDS = ("quickfix", "refactor.extract", "refactor.inline", "refactor.rewrite", "source.fixAll")
 
 # Messages beyond this many in one range are not looked at.
 MAX_MESSAGES = 50
@@ -19,6 +19,9 @@ MAX_MESSAGES = 50
 
 def code_actions(request: Request) -> list[dict[str, Any]]:
     only = request.params.get("context", {}).get("only")
+    if only and all(kind.startswith("source") for kind in only):  # as editors ask when they save
+        found = fix_all(request.scene, request.document) if _is_wanted("source.fixAll", only) else ()
+        return [_protocol(request, action) for action in found]
     return [_protocol(request, action) for action in _actions(request) if _is_wanted(action.kind, only)]
 
 

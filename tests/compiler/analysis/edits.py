@@ -30,11 +30,12 @@ def applied(text: str, action: Action) -> str:
 
 
 def fixed(text: str, code: str) -> dict[str, str]:
-    """What the fixes of the first message with ``code`` make of a text, by their titles."""
+    """What the fixes of the first message with ``code`` that has some make of a text, by their titles."""
     scene, document = opened(text)
-    message = next((each for each in scene.messages(document) if each.diagnostic.code == code), None)
-    assert message is not None, [each.diagnostic for each in scene.messages(document)]
-    return {action.title: applied(text, action) for action in fixes(scene, document, message)}
+    found = [each for each in scene.messages(document) if each.diagnostic.code == code]
+    assert found, [each.diagnostic for each in scene.messages(document)]
+    actions = ({action.title: applied(text, action) for action in fixes(scene, document, each)} for each in found)
+    return next(filter(None, actions), {})
 
 
 def refactored(marked: str) -> dict[str, str]:

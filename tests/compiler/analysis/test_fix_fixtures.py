@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 
 import pytest
 
 from plsys.compiler.analysis import CODES
-from tests.compiler.analysis.edits import fixed, messages
+from plsys.compiler.analysis.actions import Spot
+from plsys.compiler.analysis.fixes import FIXES
+from tests.compiler.analysis.edits import fixed, messages, opened
+from tests.compiler.analysis.test_fixes import FIXTURES, HEAD, WHOLE
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "reading"))
 import fixtures  # noqa: E402
@@ -37,6 +41,28 @@ def test_the_fixes_of_a_fixture(code):
         ].count(code)
 
 
-def test_codes_with_fixes_have_fixtures():
+def test_every_code_with_a_fix_shows_it_in_its_fixture():
+    """All rows of the registry; `encoding`'s message is about bytes that a file of text can't hold, see test_fixes."""
     shown = {code for code in CODES if fixtures.load(code).fixes}
-    assert len(shown) > 25
+    assert set(FIXES) - shown == {"encoding"}
+    assert "encoding" in {code for code, _, _ in FIXTURES}
+
+
+def test_every_row_of_the_registry_is_used():
+    """Each pattern fits a message of the fixtures or of test_fixes, and makes a fix of it."""
+    texts = [(code, fixtures.load(code).wrong) for code in CODES if code not in APART]
+    texts += [(code, before) for code, before, _ in FIXTURES] + [(code, HEAD + before) for code, before, _ in WHOLE]
+    texts += [("unsupported", "#local A = 1;"), ("syntax", "Selection A { A -> 1: box | ; }")]
+    waiting = {(code, id(row)): row[0] for code, rows in FIXES.items() for row in rows}
+    for code, text in texts:
+        if not any(pair[0] == code for pair in waiting):
+            continue
+        scene, document = opened(text)
+        for message in scene.messages(document):
+            found = message.diagnostic
+            spot = Spot(scene, document, message.start, message.end)
+            for row in FIXES.get(found.code, ()):
+                match = re.search(row[0], found.message)
+                if match and (made := row[1](spot, match, message)) is not None and made[1]:
+                    waiting.pop((found.code, id(row)), None)
+    assert waiting == {}

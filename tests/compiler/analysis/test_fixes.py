@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from plsys.compiler.analysis import CODES
-from plsys.compiler.analysis.fixes import FIXES, ignoring
+from plsys.compiler.analysis.fixes import FIXES, fix_all, ignoring
 from tests.compiler.analysis.edits import applied, fixed, messages, opened
 
 HEAD = "camera { location <0, -9, 0> sky <0, 0, 1> look_at <0, 0, 0> }\nlight_source { <2, -3, 4> color rgb 1 }\n"
@@ -23,6 +23,8 @@ FIXTURES = [
     ("syntax", "Selection A { A -> box +; }", "Selection A { A -> box ; }"),
     ("syntax", "Selection A { A -> 1: box | disc; }", "Selection A { A -> 1: box | 1: disc; }"),
     ("syntax", "Selection A { if (n > 0) { A -> box; } }", "Selection A { if (n > 0) A -> box; }"),
+    ("syntax", "camera { location (0, 0, 1) }", "camera { location <0, 0, 1> }"),
+    ("unknown-name", "Transformation T { trans 0 0 2*height; }", "Transformation T { trans 0 0 2*height; }\n#declare height = 1;"),
     ("syntax", "Calculation C { n = .5; }", "Calculation C { n = 0.5; }"),
     ("syntax", "Calculation C { n = 5.; }", "Calculation C { n = 5.0; }"),
     ("syntax", "Calculation C { n = 2x; }", "Calculation C { n = 2*x; }"),
@@ -117,6 +119,21 @@ def test_an_unknown_name_can_be_defined_as_what_stands_there():
     titles = list(fixed("Selection A { A -> M_up box; }", "unknown-name"))
     assert titles == ["Define the Transformation 'M_up'", "Define the Calculation 'M_up'"]
     assert list(fixed("Transformation T { trans 0 0 2*height; }", "unknown-name")) == ["Define the value 'height'"]
+
+
+def test_all_that_is_sure_is_fixed_at_once():
+    text = "Selection A { if (n = 0) A --> box }\nCalculation C { n = 2 ** 3; k = .5 }\ncamera { angle: 45; }\nobject { Aa }\n"
+    scene, document = opened(text)
+    (action,) = fix_all(scene, document)
+    after = applied(text, action)
+    # A block whose text doesn't follow the grammar tells its first mistake: once that is mended, the next.
+    while (found := next(fix_all(*opened(after)), None)) is not None:
+        after = applied(after, found)
+    assert after.splitlines() == [
+        "Selection A { if (n == 0) A -> box; }", "Calculation C { n = pow(2, 3); k = 0.5; }", "camera { angle 45 }", "object { Aa }",
+    ]  # fmt: skip
+    assert {each.diagnostic.code for each in messages(after)} & {"syntax", "missing", "assignment-in-condition"} == set()
+    assert list(fix_all(*opened("object { Aa }\n"))) == []
 
 
 def test_warnings_can_be_ignored():
