@@ -46,7 +46,7 @@ typedef struct pl_front_node {
 typedef struct pl_opened {
     const pl_item *item; /* of the parent's state, and leading to this one; NULL: node 0 */
     uint32_t parent;
-    uint32_t moved; /* the nearest node above this one whose item has transformations, or 0 */
+    uint32_t moved; /* the nearest node from this one up whose item has transformations, or 0 */
 } pl_opened;
 
 typedef struct pl_front_primitive {

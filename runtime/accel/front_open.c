@@ -324,8 +324,7 @@ static bool open_state(opening *o, const closed *c, uint32_t state)
     if (o->items) {
         pl_front_items *items = o->items;
         if (!grow(&items->opened, items->opened_count, &items->opened_capacity, sizeof *items->opened)) return false;
-        const pl_opened *above = &items->opened[c->opened];
-        uint32_t moved = !c->item ? 0 : above->item && above->item->transform_count ? c->opened : above->moved;
+        uint32_t moved = !c->item ? 0 : c->item->transform_count ? opened : items->opened[c->opened].moved;
         items->opened[items->opened_count++] = (pl_opened){c->item, c->opened, moved};
     }
     for (uint32_t i = 0; i < it->item_count; i++) {
