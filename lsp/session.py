@@ -353,7 +353,7 @@ class Session:
         if refresh and (self.client.get("textDocument") or {}).get("diagnostic") is not None:
             self.ask("workspace/diagnostic/refresh")
         refresh = ((self.client.get("workspace") or {}).get("inlayHint") or {}).get("refreshSupport")
-        if refresh and result.answer.insights is not None:
+        if refresh and (result.answer.insights or (result.answer.is_last and not result.answer.more)):
             self.ask("workspace/inlayHint/refresh")
 
     def _publish(self, document: Document) -> None:
