@@ -209,11 +209,14 @@ class Text:
     def _loose_before(self, low: int) -> int:
         """The first block that must be split again when block ``low`` is: an earlier one with an open comment, or with
         an open brace that only soft blocks follow."""
-        for block in self._loose:
-            index = self.order[block]
-            if index < low and (block.shape.comment or not any(b.shape.hard for b in self.blocks[index + 1 : low + 1])):
-                return index
-        return low
+        waiting = sorted((self.order[block] for block in self._loose), reverse=True) if self._loose else []
+        first = low
+        for index in waiting:
+            if index < first:
+                shape = self.blocks[index].shape
+                if shape.comment or not any(block.shape.hard for block in self.blocks[index + 1 : first + 1]):
+                    first = index
+        return first
 
     def _exchange(self, low: int, high: int, texts: list[tuple[bytes, Shape]]) -> tuple[Change, int]:
         """Put blocks with ``texts`` in the place of ``blocks[low:high]``, keeping those whose text is the same; also
@@ -229,7 +232,12 @@ class Text:
         self._lengths[low + head : high - tail] = [len(block.data) for block in added]
         self._line_ends[low + head : high - tail] = [block.line_ends for block in added]
         del self._starts[low + head + 1 :], self._lines[low + head + 1 :]
-        self._order = None
+        if self._order is not None and len(added) == len(removed):
+            for index, (block, new) in enumerate(zip(removed, added), low + head):
+                del self._order[block]
+                self._order[new] = index
+        else:
+            self._order = None
         for block in removed:
             block.__dict__["is_gone"] = True
         if self._loose:

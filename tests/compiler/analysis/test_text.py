@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from plsys.compiler.analysis.text import Text
 
@@ -29,6 +29,7 @@ def characters(data: bytes) -> list[int]:
 
 @settings(max_examples=300, deadline=None)
 @given(texts, edits)
+@example("\nSelection A\n{ A -> box; }\n#declare A = ", [(0.0, 0.0, "\nCalculation C {}/*"), (0.0, 0.0, "/*"), (1.0, 0.0, "*/")])
 def test_edits_and_lines_as_of_a_string(start, changes):
     data = start.encode()
     text = Text("x", None, data)
@@ -42,6 +43,7 @@ def test_edits_and_lines_as_of_a_string(start, changes):
         assert text.data == data
         assert [block.data for block in text.blocks] == [block.data for block in fresh.blocks]
         assert [block.shape for block in text.blocks] == [block.shape for block in fresh.blocks]
+        assert [text.order[block] for block in text.blocks] == list(range(len(text.blocks)))
     lines = lines_of(data)
     assert text.line_count == len(lines)
     assert [text.line_bytes(line) for line in range(len(lines))] == lines
