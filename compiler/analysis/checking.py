@@ -1,7 +1,7 @@
 """Whole-file checks, as the worker does them: part by part, so that an edit costs the checks of its own part.
 
-Requests with what changed in a scene's text → :class:`Answer`\\ s with messages, insights and the forecast of the parts
-that this touched (parts.py). A scene that includes others is one part.
+Requests with what changed in a scene's files → :class:`Answer`\\ s with messages, insights and the forecast of the parts
+that this touched (parts.py). A part may have blocks of several files.
 
 Example::
 
@@ -21,7 +21,8 @@ from typing import Any, BinaryIO, Callable, Iterable, Iterator, NamedTuple
 from ..reading import syntax
 from ..reading.diagnostics import Diagnostic, Diagnostics, PlsysError
 from ..reading.model import Empty, Model, SceneObject
-from ..reading.source import Source, Span
+from ..reading.resolve_names import _identity
+from ..reading.source import Span
 from .facts import facts_of
 from .insights import Placed, placed
 from .parts import Part, Parts
@@ -61,8 +62,7 @@ class Request(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """A message: in the block with number ``block`` of file ``file``, or with offsets in the whole file where that
-    is -1. ``notes`` are (file, block, start, end, message)."""
+    """A message in the block with number ``block`` of file ``file``. ``notes`` are (file, block, start, end, message)."""
 
     file: int
     block: int
@@ -76,19 +76,20 @@ class Finding(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """``findings`` are all about ``blocks`` of the root file (None: about all blocks), ``general`` all about what parts
-    share. ``forecast`` is None until it is known and where the scene has errors: a dict with the numbers of
-    graph.forecast.Forecast; so are ``insights``, what is shown beside the text. ``more``: parts are left to be checked,
-    for which another request has to ask."""
+    """``findings`` are all about ``blocks`` (file, number), ``general`` all about what parts share. ``forecast`` is None until
+    it is known and where the scene has errors: a dict with the numbers of graph.forecast.Forecast. ``insights`` are what
+    is shown beside the text of the blocks ``forecast_of``. ``more``: parts are left to be checked, for which another
+    request has to ask."""
 
     key: int
-    blocks: tuple[int, ...] | None
+    blocks: tuple[tuple[int, int], ...]
     findings: tuple[Finding, ...]
     general: tuple[Finding, ...]
     forecast: dict[str, Any] | None
     is_last: bool
     insights: tuple[Placed, ...] | None = None
     more: bool = False
+    forecast_of: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass
@@ -105,13 +106,13 @@ class Outcome:
 
 @dataclass
 class _Scene:
-    """A scene as the worker knows it: the blocks of the root file, the other files' texts."""
+    """A scene as the worker knows it: the blocks of its files by the files' names, the root first."""
 
-    texts: dict[str, list[bytes]] = field(default_factory=dict)
-    blocks: list[Block] = field(default_factory=list)
+    blocks: dict[str, list[Block]] = field(default_factory=dict)
     parts: Parts = field(default_factory=Parts)
-    files: dict[Path, bytes] = field(default_factory=dict)
     unsure: set[Part] = field(default_factory=set)  # told without what isn't sure
+    has_objects: bool = False
+    is_complete: bool = True  # every file that is included was found
 
 
 class Work:
@@ -129,15 +130,20 @@ class Work:
         scene = self.scenes.setdefault(request.scene, _Scene())
         while len(self.scenes) > 8:
             del self.scenes[next(iter(self.scenes))]
-        is_whole = self._take(scene, request)
+        self._take(scene, request)
         with deep_nesting(request.files[0].name):
-            order = {block: i for i, block in enumerate(scene.blocks)}
-            has_objects = any(map(_places, scene.blocks))
+            places = _places_of(scene, request)
+            order = {block: i for i, block in enumerate(_in_reading_order(scene, request))}
+            has_objects = any(map(_has_object, order))
             parts = list(scene.parts)
+            if has_objects is not scene.has_objects:
+                scene.has_objects = has_objects
+                for part in parts:
+                    part.outcome = None
             parts[1:] = reversed(parts[1:])
-            told = _Told(request, scene, order, is_whole)
+            told = _Told(request, scene, places)
             for part in _until(deadline, [part for part in parts if part.outcome is None]):
-                part.outcome = self._checked(scene, part, order, has_objects)
+                part.outcome = self._checked(scene, part, order)
                 told.new.add(part)
             answer(told.answer(None, False))
             for part in _until(deadline, [part for part in parts if part.outcome is not None and part.outcome.model is not None]):
@@ -147,54 +153,39 @@ class Work:
         answer(told.answer(None if more else _total(parts), True)._replace(more=more))
 
     @staticmethod
-    def _take(scene: _Scene, request: Request) -> bool:
-        """Bring ``scene`` up to date; whether it can't be taken apart."""
-        root = request.files[0]
-        old = scene.blocks
-        added = [Block(root.name, data, root.path, Shape(False, 0, 0, False)) for data in root.blocks]
-        removed = old[root.start : len(old) - root.end]
-        scene.blocks = [*old[: root.start], *added, *old[len(old) - root.end :]]
-        scene.files = {}
-        for file in request.files[1:]:
-            known = scene.texts.get(file.name, [])
-            scene.texts[file.name] = [*known[: file.start], *file.blocks, *known[len(known) - file.end :]]
-            if file.path is not None:
-                scene.files[file.path] = b"".join(scene.texts[file.name])
-        if any(facts_of(block).includes for block in scene.blocks if b"include" in block.data):
-            scene.parts = Parts()
-            scene.parts.base.blocks = scene.blocks
-            return True
-        if scene.parts.base.blocks:
-            removed, added, scene.parts = [], scene.blocks, Parts()
-        scene.parts.change(removed, added)
-        return False
+    def _take(scene: _Scene, request: Request) -> None:
+        """Bring ``scene`` up to date."""
+        removed, added, before = [], [], scene.blocks
+        scene.blocks = {}
+        for file in request.files:
+            old = before.pop(file.name, [])
+            new = [Block(file.name, data, file.path, Shape(False, 0, 0, False)) for data in file.blocks]
+            removed += old[file.start : len(old) - file.end]
+            added += new
+            scene.blocks[file.name] = [*old[: file.start], *new, *old[len(old) - file.end :]]
+        removed += [block for blocks in before.values() for block in blocks]
+        if removed or added:
+            scene.parts.change(removed, added)
 
-    def _checked(self, scene: _Scene, part: Part, order: dict[Block, int], has_objects: bool) -> Outcome:
+    def _checked(self, scene: _Scene, part: Part, order: dict[Block, int]) -> Outcome:
         from ..reading.check import check
         from ..reading.resolve import resolve
 
-        blocks = part.blocks
-        if blocks is not scene.blocks:
-            blocks = sorted((*part.blocks, *scene.parts.needed(part)), key=order.__getitem__)
+        blocks = sorted((*part.blocks, *scene.parts.needed(part)), key=order.__getitem__)
         diagnostics = Diagnostics()
         definitions: list[syntax.Definition] = []
         for block in blocks:
             facts = facts_of(block)
             diagnostics.items += facts.syntax
-            definitions += facts.file.definitions
-
-        def loader(path: Path) -> Source:
-            same = (text for known, text in scene.files.items() if known == path or known.resolve() == path.resolve())
-            data = next(same, None)
-            return Source.read(path) if data is None else Source(str(path), data, path)
-
+            definitions += [each for each in facts.file.definitions if not isinstance(each, syntax.Include)]
         try:
-            start = Span(scene.blocks[0], 0, len(scene.blocks[0].data))
-            model = resolve(syntax.File(start, tuple(definitions)), diagnostics, loader=loader)
+            first = next(iter(scene.blocks.values()))[0]  # the root's: of other files, what nothing uses isn't said
+            start = Span(first, 0, len(first.data))
+            model = resolve(syntax.File(start, tuple(definitions)), diagnostics)
             late = [each for each in diagnostics.items if each.code in LATE_CODES]
             before, is_broken = len(diagnostics.items), diagnostics.has_errors
             if not is_broken:
-                if blocks is not scene.blocks and not model.objects and has_objects:
+                if not model.objects and scene.has_objects:
                     # The scene has objects, though this part has none.
                     model.objects.append(SceneObject("", 0, Empty(), start))
                 check(model, diagnostics)
@@ -212,11 +203,39 @@ def _until(deadline: float | None, parts: Iterable[Part]) -> Iterator[Part]:
             return
 
 
-def _places(block: Block) -> bool:
+def _has_object(block: Block) -> bool:
     from ..reading.resolve_names import OBJECT_BLOCKS
 
     facts = facts_of(block)
     return any(each.name.name in OBJECT_BLOCKS for each in facts.blocks)
+
+
+def _places_of(scene: _Scene, request: Request) -> dict[Block, tuple[int, int]]:
+    """The number of each block's file, and its own number there."""
+    files = enumerate(scene.blocks[file.name] for file in request.files)
+    return {block: (number, i) for number, blocks in files for i, block in enumerate(blocks)}
+
+
+def _in_reading_order(scene: _Scene, request: Request) -> list[Block]:
+    """The blocks of all files, those of an included file before the block that includes it. Notes whether all were found."""
+    by_path = {_identity(file.path): file.name for file in request.files if file.path is not None}
+    found: list[Block] = []
+    waiting = {file.name for file in request.files}
+    scene.is_complete = True
+
+    def walk(name: str) -> None:
+        waiting.discard(name)
+        for block in scene.blocks[name]:
+            for node in facts_of(block).includes if b"include" in block.data else ():
+                target = by_path.get(_identity((block.path.parent if block.path else Path()) / node.path.value))
+                if target is None:
+                    scene.is_complete = False
+                elif target in waiting:
+                    walk(target)
+            found.append(block)
+
+    walk(request.files[0].name)
+    return found + [block for name in scene.blocks if name in waiting for block in scene.blocks[name]]
 
 
 def _predict(outcome: Outcome) -> None:
@@ -261,27 +280,26 @@ def _sum(values: Iterable[Any]) -> Any:
 class _Told:
     """What an answer says: spans as numbers."""
 
-    def __init__(self, request: Request, scene: _Scene, order: dict[Block, int], is_whole: bool) -> None:
-        self.request, self.scene, self.order, self.is_whole = request, scene, order, is_whole
+    def __init__(self, request: Request, scene: _Scene, places: dict[Block, tuple[int, int]]) -> None:
+        self.request, self.scene, self.places = request, scene, places
         self.new: set[Part] = set()
         self.parts = list(scene.parts)
-        self.files = {str(file.path): number for number, file in enumerate(request.files)}
 
     def answer(self, forecast: dict[str, Any] | None, is_last: bool) -> Answer:
         scene = self.scene
         outcomes = [part.outcome for part in self.parts if part.outcome is not None]
-        is_unsure = any(outcome.is_broken for outcome in outcomes) and not self.is_whole
+        is_unsure = not scene.is_complete or any(outcome.is_broken for outcome in outcomes)
         scene.unsure.intersection_update([part for part in self.parts if part.outcome is not None])
         told = self.new if is_unsure else self.new | scene.unsure
         scene.unsure = scene.unsure | self.new if is_unsure else set()
         own, general = self._diagnostics(told)
         findings = [each for each in own if not (is_unsure and each.code in _UNSURE)]
-        shown = [part.outcome.insights for part in self.new if part.outcome.insights is not None]
-        insights = tuple(each for found in shown for each in placed(found, self.of)) if is_last else None
-        blocks = None if self.is_whole else tuple(self.order[block] for part in told for block in part.blocks)
+        shown = [part for part in self.new if part.outcome.insights is not None] if is_last else []
+        insights = tuple(each for part in shown for each in placed(part.outcome.insights, self.of)) if is_last else None
+        blocks = tuple(self.places[block] for part in told for block in part.blocks)
         return Answer(
             self.request.key, blocks, tuple(map(self.finding, findings)), tuple(map(self.finding, general)),
-            forecast, is_last, insights,
+            forecast, is_last, insights, forecast_of=tuple(self.places[block] for part in shown for block in part.blocks),
         )  # fmt: skip
 
     def _diagnostics(self, told: set[Part]) -> tuple[list[Diagnostic], list[Diagnostic]]:
@@ -294,10 +312,8 @@ class _Told:
                 continue
             blocks = set(part.blocks)
             for each in part.outcome.diagnostics:
-                if self.is_whole:
-                    own.append(each)
-                elif each.code in _MISSING:
-                    if part is self.scene.parts.base or each.code == "no-object":
+                if each.code in _MISSING:
+                    if self.scene.is_complete and (part is self.scene.parts.base or each.code == "no-object"):
                         missing[each.code] = each
                 elif each.span.source not in blocks:
                     general.setdefault((each.code, each.span.source, each.span.start), each)
@@ -306,10 +322,7 @@ class _Told:
         return own, [*missing.values(), *general.values()]
 
     def of(self, span: Span) -> tuple[int, int, int, int]:
-        number = self.order.get(span.source)
-        if number is not None:
-            return 0, number, span.start, span.end
-        return self.files.get(str(span.source.path), 0), -1, span.start, span.end
+        return (*self.places.get(span.source, (0, 0)), span.start, span.end)  # type: ignore[call-overload]
 
     def finding(self, d: Diagnostic) -> Finding:
         notes = tuple((*self.of(note.span), note.message) for note in d.notes)

@@ -24,7 +24,7 @@ Insight = SymbolInsight | GuardInsight | ValueInsight
 
 
 class Placed(NamedTuple):
-    """``place`` as in whole.Finding: file, block (or -1), start, end. The insight's own span is None."""
+    """``place`` as in whole.Finding: file, block, start, end. The insight's own span is None."""
 
     place: tuple[int, int, int, int]
     insight: Insight

@@ -43,7 +43,7 @@ def _role(facts: Facts) -> Role:
     kind = "tied"
     if all(each.name.name in _GENERAL for each in facts.blocks) and not facts.is_broken:
         if not facts.definitions:
-            kind = "general"
+            kind = "general" if facts.blocks or facts.includes else "shared"
         elif not facts.blocks and all(_is_shared(each, names - defined) for each in facts.definitions):
             kind = "shared"
     return Role(kind, frozenset(names), frozenset(defined))

@@ -16,6 +16,7 @@ Example::
 from __future__ import annotations
 
 import time
+from itertools import count
 from pathlib import Path
 from typing import Callable, Iterator
 
@@ -39,10 +40,13 @@ _SINGLE = ("camera", "background")
 
 
 class Scene:
-    """``open_file`` gives the document of a path, or raises OSError."""
+    """``open_file`` gives the document of a path, or raises OSError. ``number`` is this scene's own."""
+
+    _numbers = count(1)
 
     def __init__(self, root: Document, open_file: Callable[[Path], Document]) -> None:
         self.root, self.open_file = root, open_file
+        self.number = next(self._numbers)
         self.documents: list[Document] = []
         names = self._names = Namespace(self._position)
         self.entries, self.definers, self.writers, self.users = names.entries, names.definers, names.writers, names.users

@@ -50,7 +50,7 @@ class Snapshot:
             start, end = _difference(old, several)
             data = tuple(block.data for block in several[start : len(several) - end])
             files.append(FileText(document.text.name, document.path, start, end, data))
-        return cls(scene, blocks, Request(number, id(scene), tuple(files)))
+        return cls(scene, blocks, Request(number, scene.number, tuple(files)))
 
 
 def _difference(old: list[Block], new: list[Block]) -> tuple[int, int]:
@@ -76,16 +76,11 @@ class Result:
         """Give the scene its messages; those of blocks that have changed since are dropped."""
         scene, answer = self.snapshot.scene, self.answer
         scene.forecast = answer.forecast or scene.forecast
-        if answer.blocks is None:
-            scene.whole.clear()
-        else:
-            for number in answer.blocks:
-                scene.whole.pop(self.snapshot.blocks[0][number], None)
-        if answer.insights is not None:
-            if answer.blocks is None:
-                scene.insights.clear()
-            for block, found in kept(answer.insights, self._span).items():
-                scene.insights[block] = found
+        for file, number in answer.blocks:
+            scene.whole.pop(self.snapshot.blocks[file][number], None)
+        for file, number in answer.forecast_of:
+            scene.insights.pop(self.snapshot.blocks[file][number], None)
+        scene.insights.update(kept(answer.insights or (), self._span))
         scene.general.clear()
         for finding in answer.findings:
             self._keep(finding, scene.whole)
@@ -100,13 +95,8 @@ class Result:
             table.setdefault(block, []).append(message)
 
     def _span(self, file: int, number: int, start: int, end: int) -> tuple[Block, Span]:
-        blocks = self.snapshot.blocks[file]
-        if number < 0:
-            number = 0
-            while number < len(blocks) - 1 and start >= len(blocks[number].data):
-                start, end = start - len(blocks[number].data), end - len(blocks[number].data)
-                number += 1
-        return blocks[number], Span(blocks[number], start, end)
+        block = self.snapshot.blocks[file][number]
+        return block, Span(block, start, end)
 
 
 def run(scene: Scene) -> None:
