@@ -45,7 +45,7 @@ class Dispatcher:
         self.session = Session(self.send, self._wake)
         self.inbox: deque[Any] = deque()
         self.cancelled: set[Any] = set()
-        self._scheduled = self._has_opened = False
+        self._scheduled = self._has_opened = self._has_closed = False
         self._pause: asyncio.TimerHandle | None = None
 
     def deliver(self, body: bytes) -> None:
@@ -107,6 +107,10 @@ class Dispatcher:
     def _rest(self) -> None:
         """The client has paused: do what need not be done between two keys."""
         self.session.start_checks()
+        if self._has_closed:  # what was known about a file refers to itself
+            self._has_closed = False
+            gc.unfreeze()
+            gc.collect()
         gc.freeze()
 
     def _handle(self, message: Any) -> None:
@@ -119,6 +123,7 @@ class Dispatcher:
         if isinstance(message, dict) and message.get("method") == "textDocument/didOpen":
             self._has_opened = True
             gc.disable()  # until it is read: nearly all of it stays
+        self._has_closed |= isinstance(message, dict) and message.get("method") == "textDocument/didClose"
 
     def send(self, message: dict) -> None:
         try:

@@ -20,12 +20,13 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, Callable
 
-from plsys.compiler.analysis import Checker, Document, Result
+from plsys.compiler.analysis import Checker, Document, Folders, Found, Result
 
 from . import features
+from .progress import Progress
 from .request import Feature, Request
 from .text import ENCODINGS
-from .workspace import UnknownDocument, Workspace, path_of
+from .workspace import UnknownDocument, Workspace
 
 logger = logging.getLogger(__name__)
 
@@ -73,11 +74,12 @@ class Session:
     def __init__(self, send: Callable[[dict], None], wake: Callable[[], None] | None = None) -> None:
         self._send = send
         self._wake = wake
-        self._results: deque[Result] = deque()
-        self._checker = Checker(self._on_result) if wake is not None else None
+        self._arrived: deque[Callable[[], None]] = deque()  # what workers found, to be taken in
+        self._checker = Checker(lambda result: self._later(self._take, result)) if wake is not None else None
         self.features = load_features()
         self.workspace = Workspace()
         self.client: dict[str, Any] = {}
+        self.progress = Progress(self.ask, self.notify, self.client)
         self.exit_code: int | None = None
         self._initialized = self._shut_down = False
         self._changed: dict[Document, None] = {}  # open documents whose diagnostics may be out of date
@@ -86,6 +88,7 @@ class Session:
         self._waiting: list[dict] = []  # requests about files that are being opened
         self._shown_early = False  # semantic tokens were sent without knowing all names
         self._next_id = 0
+        self._asked: dict[str, Callable[[dict], None]] = {}  # requests of ours that wait for an answer
         self._notifications: dict[str, Callable[[dict], None]] = {
             "textDocument/didOpen": self._did_open,
             "textDocument/didChange": self._did_change,
@@ -105,7 +108,10 @@ class Session:
             return
         method, number = message.get("method"), message.get("id")
         if method is None:
-            return  # an answer to a request of ours; none needs one
+            then = self._asked.pop(number, None) if isinstance(number, str) else None
+            if then is not None:
+                then(message)
+            return
         params = message.get("params")
         if number is not None:
             params = params if isinstance(params, dict) else {}
@@ -121,7 +127,11 @@ class Session:
 
     def _must_wait(self, method: str) -> bool:
         """Whether an answer needs files that are still being read."""
-        if method not in self.features or self._shut_down or not self.workspace.is_opening:
+        if method not in self.features or self._shut_down:
+            return False
+        if method == "textDocument/rename" and self.workspace.scans.is_reading:
+            return True  # it must not miss a file
+        if not self.workspace.is_opening:
             return False
         self._shown_early |= method.startswith("textDocument/semanticTokens")
         return method not in EARLY
@@ -135,7 +145,7 @@ class Session:
     def _answer_waiting(self) -> None:
         waiting, self._waiting = self._waiting, []
         for message in waiting:
-            self.receive(message)
+            self.receive(message)  # may wait again
         refresh = ((self.client.get("workspace") or {}).get("semanticTokens") or {}).get("refreshSupport")
         if refresh and self._shown_early:
             self.ask("workspace/semanticTokens/refresh")
@@ -188,10 +198,13 @@ class Session:
     def notify(self, method: str, params: Any) -> None:
         self._send({"jsonrpc": "2.0", "method": method, "params": params})
 
-    def ask(self, method: str, params: Any = None) -> None:
-        """Send the client a request whose answer doesn't matter."""
+    def ask(self, method: str, params: Any = None, then: Callable[[dict], None] | None = None) -> None:
+        """Send the client a request; ``then`` gets the answer's message."""
         self._next_id += 1
-        self._send({"jsonrpc": "2.0", "id": f"plsys-{self._next_id}", "method": method, "params": params})
+        number = f"plsys-{self._next_id}"
+        if then is not None:
+            self._asked[number] = then
+        self._send({"jsonrpc": "2.0", "id": number, "method": method, "params": params})
 
     # --- the session's life
 
@@ -200,11 +213,13 @@ class Session:
         self.client = capabilities if isinstance(capabilities, dict) else {}
         offered = (self.client.get("general") or {}).get("positionEncodings") or ["utf-16"]
         encoding = next((each for each in ENCODINGS if each in offered), "utf-16")
-        self.workspace = Workspace(encoding)
+        scans = Folders(lambda found: self._later(self._take_found, found)) if self._wake is not None else None
+        self.workspace = Workspace(encoding, scans)
+        self.progress = Progress(self.ask, self.notify, self.client)
         for folder in params.get("workspaceFolders") or []:
-            self._add_folder(folder["uri"])
+            self.workspace.add_folder(folder["uri"])
         if not self.workspace.folders and params.get("rootUri"):
-            self._add_folder(params["rootUri"])
+            self.workspace.add_folder(params["rootUri"])
         self._initialized = True
         return {"capabilities": self.capabilities(encoding), "serverInfo": {"name": "plsys"}}
 
@@ -233,6 +248,7 @@ class Session:
             registration = {"id": "watch", "method": "workspace/didChangeWatchedFiles",
                             "registerOptions": {"watchers": watchers}}
             self.ask("client/registerCapability", {"registrations": [registration]})
+        self.workspace.scans.scan(self.workspace.folders.values())
 
     def _exit(self, params: dict) -> None:
         self.exit_code = 0 if self._shut_down else 1
@@ -241,6 +257,7 @@ class Session:
         """Let go of what the session holds outside of this process."""
         if self._checker is not None:
             self._checker.close()
+        self.workspace.scans.close()
 
     # --- texts
 
@@ -269,20 +286,15 @@ class Session:
             self.notify("textDocument/publishDiagnostics", {"uri": uri, "diagnostics": []})
 
     def _did_change_watched_files(self, params: dict) -> None:
-        for change in params["changes"]:
-            self.workspace.file_changed(change["uri"])
+        self.workspace.files_changed([change["uri"] for change in params["changes"]])
         self._touch_all()
 
     def _did_change_folders(self, params: dict) -> None:
         for folder in params["event"].get("removed", ()):
-            self.workspace.folders.pop(folder["uri"], None)
-        for folder in params["event"].get("added", ()):
-            self._add_folder(folder["uri"])
-
-    def _add_folder(self, uri: str) -> None:
-        path = path_of(uri)
-        if path is not None:
-            self.workspace.folders[uri] = path
+            self.workspace.remove_folder(folder["uri"])
+        added = [self.workspace.add_folder(folder["uri"]) for folder in params["event"].get("added", ())]
+        self.workspace.scans.scan(path for path in added if path is not None)
+        self._touch_all()
 
     # --- what follows from edits
 
@@ -302,13 +314,13 @@ class Session:
 
     @property
     def has_work(self) -> bool:
-        return bool(self._changed or self._results) or self.workspace.is_opening
+        return bool(self._changed or self._arrived) or self.workspace.is_opening
 
     def work(self) -> None:
         """Read and resolve for a moment what edits touched, and publish what is known. Call it until ``has_work`` is
         false."""
-        while self._results:
-            self._take(self._results.popleft())
+        while self._arrived:
+            self._arrived.popleft()()
         finished = self.workspace.project.work(SLICE)
         documents, now = self._with_neighbours(), time.perf_counter()
         if finished:
@@ -335,10 +347,23 @@ class Session:
         """Have what changed checked as a whole. To be called when the client has paused."""
         if self._checker is not None and not self._changed:
             self._checker.go()
+            if self._checker.is_idle:
+                self.progress.end("checks")
 
-    def _on_result(self, result: Result) -> None:
-        self._results.append(result)
+    def _later(self, take: Callable[[Any], None], what: Any) -> None:
+        """Have ``work`` take in what a worker found. In any thread."""
+        self._arrived.append(lambda: take(what))
         self._wake()
+
+    def _take_found(self, found: Found) -> None:
+        """Something was found in the folders: other scenes may include what is open."""
+        self.workspace.take(found)
+        if found.is_last and not self.workspace.scans.is_reading:
+            self.progress.end("scan")
+        elif found.total:
+            said = f"{found.done:,} of {found.total:,} files"
+            self.progress.report("scan", "Reading scenes", said, 100 * found.done // found.total)
+        self._touch_all()
 
     def _take(self, result: Result) -> None:
         """Show what the whole-file checks found."""
@@ -346,6 +371,10 @@ class Session:
         if result.answer.more and self._checker is not None:
             self._checker.want(result.snapshot.scene)
             self._checker.go()
+            name = result.snapshot.scene.root.text.name.rpartition("/")[2]
+            self.progress.report("checks", "Checking", name, int(100 * result.answer.share))
+        elif result.answer.is_last:
+            self.progress.end("checks")
         for document in result.snapshot.scene.documents:
             if document in self.workspace.uris:
                 self._changed[document] = None

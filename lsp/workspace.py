@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Iterable, Iterator
 from urllib.parse import quote, unquote, urlsplit
 
-from plsys.compiler.analysis import Document, Message, Place, Project, Scene
+from plsys.compiler.analysis import SCENE_SUFFIX, Document, Folders, Found, Message, Place, Project, Scene
 
 from .text import Edit, Positions, encode
 
@@ -37,11 +37,13 @@ class UnknownDocument(Exception):
 
 
 class Workspace:
-    """``encoding`` is utf-8, utf-16 or utf-32; ``folders`` are the roots that the client has open."""
+    """``encoding`` is utf-8, utf-16 or utf-32; ``folders`` are the roots that the client has open, ``scans`` what they
+    hold."""
 
-    def __init__(self, encoding: str = "utf-16") -> None:
+    def __init__(self, encoding: str = "utf-16", scans: Folders | None = None) -> None:
         self.encoding = encoding
-        self.project = Project()
+        self.scans = scans or Folders()
+        self.project = Project(self.scans.scenes_above)
         self.folders: dict[str, Path] = {}
         self.open: dict[str, Document] = {}
         self.uris: dict[Document, str] = {}
@@ -79,10 +81,30 @@ class Workspace:
             self.project.close(document)
         return document
 
-    def file_changed(self, uri: str) -> None:
+    def files_changed(self, uris: Iterable[str]) -> None:
+        """Files came, changed or went outside of the editor."""
+        paths = {uri: path for uri in uris if (path := path_of(uri)) is not None}
+        for uri, path in paths.items():
+            if uri not in self.open:
+                self.project.file_changed(path)
+        self.scans.look_at(path for path in paths.values() if path.suffix == SCENE_SUFFIX)
+
+    def add_folder(self, uri: str) -> Path | None:
         path = path_of(uri)
-        if path is not None and uri not in self.open:
-            self.project.file_changed(path)
+        if path is not None:
+            self.folders[uri] = path
+        return path
+
+    def remove_folder(self, uri: str) -> None:
+        path = self.folders.pop(uri, None)
+        if path is not None:
+            self.scans.remove(path, self.folders.values())
+            self.project.folders_changed()
+
+    def take(self, found: Found) -> None:
+        """Something was found in the folders."""
+        self.scans.take(found)
+        self.project.folders_changed()
 
     # --- documents and places
 

@@ -26,6 +26,8 @@ from .actions import Action, TextEdit
 from .document import Document, Meaning, Message, Outline, Place
 from .facts import Definition, Facts, Name, facts_of
 from .fixes import fix_all, fixes, ignoring
+from .folders import SUFFIX as SCENE_SUFFIX
+from .folders import Folders, Found
 from .format import Formatted, format_document
 from .insights import GuardInsight, Insight, SymbolInsight, ValueInsight, insights_in, insights_of
 from .motion import Motion, constant_of, motion_of
@@ -37,8 +39,8 @@ from .whole import Checker, Result
 from .whole import run as check_whole
 
 __all__ = [
-    "Action", "Block", "CODES", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Formatted",
-    "GuardInsight", "Insight", "Meaning", "Message", "Motion", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
-    "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "facts_of", "fix_all", "fixes",
+    "Action", "Block", "CODES", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Folders",
+    "Formatted", "Found", "GuardInsight", "Insight", "Meaning", "Message", "Motion", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
+    "SCENE_SUFFIX", "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "facts_of", "fix_all", "fixes",
     "format_document", "ignoring", "insights_in", "insights_of", "motion_of", "nearest", "queries", "refactorings", "syntax", "vocabulary",
 ]  # fmt: skip

@@ -10,13 +10,11 @@ Example::
 
 from __future__ import annotations
 
-import os
 import pickle
-import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO, Callable, Iterable, Iterator, NamedTuple
+from typing import Any, Callable, Iterable, Iterator, NamedTuple
 
 from ..reading import syntax
 from ..reading.diagnostics import Diagnostic, Diagnostics, PlsysError
@@ -28,6 +26,7 @@ from .insights import Placed, placed
 from .parts import Part, Parts
 from .split import Shape
 from .text import Block
+from .worker import streams
 
 # Messages of resolving that need work which blocks alone don't do: loading meshes.
 LATE_CODES = frozenset(("file",))
@@ -54,11 +53,13 @@ class FileText(NamedTuple):
 
 
 class Request(NamedTuple):
-    """What the worker gets: the scene's root first, then included files."""
+    """What the worker gets: the scene's root first, then included files. ``forget`` are scenes that aren't asked about
+    again, unless with all their text."""
 
     key: int
     scene: int
     files: tuple[FileText, ...]
+    forget: tuple[int, ...] = ()
 
 
 class Finding(NamedTuple):
@@ -90,6 +91,7 @@ class Answer(NamedTuple):
     insights: tuple[Placed, ...] | None = None
     more: bool = False
     forecast_of: tuple[tuple[int, int], ...] = ()
+    share: float = 1.0  # of the parts that are done
 
 
 @dataclass
@@ -128,8 +130,8 @@ class Work:
 
         deadline = None if seconds is None else time.perf_counter() + seconds
         scene = self.scenes.setdefault(request.scene, _Scene())
-        while len(self.scenes) > 8:
-            del self.scenes[next(iter(self.scenes))]
+        for number in request.forget:
+            self.scenes.pop(number, None)
         self._take(scene, request)
         with deep_nesting(request.files[0].name):
             places = _places_of(scene, request)
@@ -149,8 +151,9 @@ class Work:
             for part in _until(deadline, [part for part in parts if part.outcome is not None and part.outcome.model is not None]):
                 _predict(part.outcome)
                 told.new.add(part)
-        more = any(part.outcome is None or part.outcome.model is not None for part in parts)
-        answer(told.answer(None if more else _total(parts), True)._replace(more=more))
+        left = sum(part.outcome is None or part.outcome.model is not None for part in parts)
+        last = told.answer(None if left else _total(parts), True)
+        answer(last._replace(more=left > 0, share=1 - left / len(parts)))
 
     @staticmethod
     def _take(scene: _Scene, request: Request) -> None:
@@ -334,13 +337,7 @@ class _Told:
 
 def main() -> None:
     """The worker: pickled Requests on standard input → pickled Answers on standard output."""
-    try:
-        os.nice(5)
-    except (AttributeError, OSError):
-        pass
-    stream: BinaryIO = sys.stdin.buffer
-    output = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
+    stream, output = streams()
     work = Work()
 
     def send(answer: Answer) -> None:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Iterable
+from typing import Callable, Iterable, Iterator
 
 from .document import Document, Message
 from .scene import Scene
@@ -24,9 +24,12 @@ from .text import Change
 
 
 class Project:
-    def __init__(self) -> None:
+    """``scenes_above`` gives the files, open or not, whose scenes a file is part of (folders.py)."""
+
+    def __init__(self, scenes_above: Callable[[Path], Iterable[Path]] = lambda path: ()) -> None:
         self.documents: dict[Path | str, Document] = {}
         self.scenes: dict[Document, Scene] = {}
+        self.scenes_above = scenes_above
 
     # --- files
 
@@ -98,20 +101,57 @@ class Project:
 
     def _find_scenes(self) -> None:
         """A scene for each open document that is in none, and none for those that another scene has taken in."""
-        for document in list(self.documents.values()):
-            if document.version is not None and not document.scenes:
+        for document in [each for each in self.documents.values() if each.version is not None]:
+            self._open_scenes_above(document)
+            if not document.scenes:
                 self.scenes[document] = Scene(document, self.document)
         for root, scene in list(self.scenes.items()):
             elsewhere = any(other is not scene for other in root.scenes)
             unused = all(document.version is None for document in scene.documents)
             if unused or (elsewhere and not _includes_all(root, scene)):
-                del self.scenes[root]
-                for document in scene.documents:
-                    document.scenes.remove(scene)
+                self._drop(scene)
         needed = {document for scene in self.scenes.values() for document in scene.documents}
         for key, document in list(self.documents.items()):
             if document.version is None and document not in needed:
                 del self.documents[key]
+
+    def _open_scenes_above(self, document: Document) -> None:
+        for path in self.scenes_above(document.path) if document.path is not None else ():
+            try:
+                root = self.document(path)
+            except OSError:
+                continue
+            if not root.scenes:
+                self.scenes[root] = Scene(root, self.document)
+
+    def folders_changed(self) -> None:
+        """What ``scenes_above`` says is new. Scenes that nobody has open and that it no longer names are dropped."""
+        opened = [each.path for each in self.documents.values() if each.version is not None and each.path is not None]
+        named = {_key(path) for each in opened for path in self.scenes_above(each)}
+        for root, scene in list(self.scenes.items()):
+            if root.version is None and root.path is not None and _key(root.path) not in named:
+                self._drop(scene)
+        self._find_scenes()
+
+    def _drop(self, scene: Scene) -> None:
+        del self.scenes[scene.root]
+        for document in scene.documents:
+            document.scenes.remove(scene)
+
+    def scenes_with(self, name: str, document: Document) -> Iterator[Scene]:
+        """The scenes in which ``name`` means what it does in ``document``: those that share a file that has it. All that
+        edits touched in them is read."""
+        seen: list[Scene] = []
+        waiting, looked_at = [document], {document}
+        while waiting:
+            for scene in waiting.pop().scenes:
+                if scene not in seen:
+                    seen.append(scene)
+                    scene.work()
+                    yield scene
+                    users = {place.document for place in scene.uses(name)} - looked_at
+                    looked_at |= users
+                    waiting += users
 
     def scene_of(self, document: Document) -> Scene:
         """The scene that ``document`` is looked at in."""

@@ -68,6 +68,11 @@ class Scene:
         self._include_messages: dict[Block, list[Diagnostic]] = {}
         self._find_files()
 
+    @property
+    def is_alive(self) -> bool:
+        """Whether this is still one of the scenes that its root is looked at in."""
+        return self in self.root.scenes
+
     # --- following the text
 
     def changed(self, change: Change) -> None:

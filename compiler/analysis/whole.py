@@ -15,20 +15,23 @@ Example::
 
 from __future__ import annotations
 
-import os
 import pickle
 import subprocess
-import sys
 import threading
 from dataclasses import dataclass
 from typing import Callable
 
 from ..reading.diagnostics import Diagnostic, Note
 from ..reading.source import Span
+from . import worker
 from .checking import Answer, FileText, Finding, Request, Work
 from .insights import kept
 from .scene import Scene
 from .text import Block
+
+
+# The worker keeps what it found out about so many scenes.
+MAX_KNOWN = 16
 
 
 @dataclass
@@ -130,6 +133,9 @@ class Checker:
         with self._lock:
             if self._running is not None or not self._wanted:
                 return
+            self._wanted = {scene: None for scene in self._wanted if scene.is_alive}
+            if not self._wanted:
+                return
             scene = next(iter(self._wanted))
             del self._wanted[scene]
             self._number += 1
@@ -137,11 +143,16 @@ class Checker:
                 process = self._process or self._start()
             except OSError:
                 return  # no process to be had: editing goes on without these checks
-            self._running = snapshot = Snapshot.of(scene, self._number, self._sent.get(scene))
-            self._sent[scene] = snapshot
+            snapshot = Snapshot.of(scene, self._number, self._sent.pop(scene, None))
+            gone = [other for other in self._sent if not other.is_alive]
+            gone += [other for other in self._sent if other.is_alive][: max(0, len(self._sent) - len(gone) - MAX_KNOWN)]
+            for other in gone:
+                del self._sent[other]
+            snapshot.request = snapshot.request._replace(forget=tuple(other.number for other in gone))
+            self._running = self._sent[scene] = snapshot
         data = pickle.dumps(snapshot.request)
         # The pipe may be full while the worker works.
-        threading.Thread(target=self._write, args=(process, data), daemon=True).start()
+        threading.Thread(target=worker.write, args=(process, data), daemon=True).start()
 
     @property
     def is_idle(self) -> bool:
@@ -155,26 +166,12 @@ class Checker:
             process.wait()
 
     def _start(self) -> subprocess.Popen:
-        command = [sys.executable, "-c", f"from {Work.__module__} import main; main()"]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(each for each in sys.path if each)}
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment)
+        self._process = worker.start(Work.__module__)
         threading.Thread(target=self._read, args=(self._process,), daemon=True).start()
         return self._process
 
-    @staticmethod
-    def _write(process: subprocess.Popen, data: bytes) -> None:
-        try:
-            process.stdin.write(data)
-            process.stdin.flush()
-        except (OSError, ValueError):
-            pass  # it ended; _read notices
-
     def _read(self, process: subprocess.Popen) -> None:
-        while True:
-            try:
-                answer: Answer = pickle.load(process.stdout)
-            except (EOFError, OSError, pickle.UnpicklingError, ValueError):
-                break
+        for answer in worker.answers(process):
             with self._lock:
                 snapshot = self._running
                 if snapshot is None or answer.key != snapshot.request.key:

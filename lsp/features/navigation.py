@@ -36,7 +36,8 @@ def references(request: Request) -> list[dict[str, Any]]:
     if found is None or found[0] not in request.scene.entries:
         return []
     declarations = request.params.get("context", {}).get("includeDeclaration", True)
-    places = request.scene.uses(found[0])
+    scenes = request.workspace.project.scenes_with(found[0], request.document)
+    places = dict.fromkeys(place for scene in scenes for place in scene.uses(found[0]))
     return [request.location(place) for place in places if declarations or place.role != "definition"]
 
 

@@ -7,7 +7,7 @@ refused with a sentence: "'Bush' is in this scene already: a Selection".
 from __future__ import annotations
 
 import re
-from typing import Any, Iterator
+from typing import Any
 
 from plsys.compiler.analysis import Document, Place, Scene, facts_of, vocabulary
 from plsys.lsp.request import Feature, Request
@@ -37,7 +37,7 @@ def rename(request: Request) -> dict[str, Any] | None:
     name, _ = found
     if new == name:
         return None
-    scenes = list(_scenes_of(name, request.document))
+    scenes = list(request.workspace.project.scenes_with(name, request.document))
     places = {(place.document, place.start, place.end): place for scene in scenes for place in scene.uses(name)}
     _check(name, new, scenes, list(places.values()))
     edits: dict[Document, list[dict]] = {}
@@ -57,23 +57,6 @@ def _renameable(request: Request) -> tuple[str, Place] | None:
     if name not in request.scene.entries:
         raise Refused(f"nothing defines '{name}', so there is nothing to rename")
     return found
-
-
-def _scenes_of(name: str, document: Document) -> Iterator[Scene]:
-    """The scenes in which ``name`` means the same: those that share a file that has it."""
-    seen: list[Scene] = []
-    waiting = [document]
-    looked_at = {document}
-    while waiting:
-        for scene in waiting.pop().scenes:
-            if scene in seen:
-                continue
-            seen.append(scene)
-            scene.work()
-            yield scene
-            users = {place.document for place in scene.uses(name)} - looked_at
-            looked_at |= users
-            waiting += users
 
 
 def _check(old: str, new: str, scenes: list[Scene], places: list[Place]) -> None:

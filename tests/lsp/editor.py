@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from plsys.compiler.analysis import check_whole
-from plsys.compiler.analysis import check_whole
 from plsys.lsp.session import Session
 
 CURSOR = "<cursor>"
@@ -25,16 +24,19 @@ class Refusal(Exception):
 
 class Editor:
     """``files`` is one text or several by name, written to ``folder`` where one is given; the (first) mark is the cursor.
-    ``client`` are its capabilities."""
+    ``client`` are its capabilities, ``roots`` the folders that it has open."""
 
     def __init__(
-        self, files: str | dict[str, str], folder: Path | None = None, client: dict | None = None, encoding: str = "utf-16"
-    ) -> None:
+        self, files: str | dict[str, str], folder: Path | None = None, client: dict | None = None, encoding: str = "utf-16",
+        roots: tuple[Path, ...] = (),
+    ) -> None:  # fmt: skip
         self.sent: list[dict] = []
         self.session = Session(self.sent.append)
         self._id = 0
         capabilities = {"general": {"positionEncodings": [encoding]}, **(client or {})}
-        self.server = self.request("initialize", {"capabilities": capabilities})["capabilities"]
+        folders = [{"uri": root.as_uri(), "name": root.name} for root in roots]
+        parameters = {"capabilities": capabilities, "workspaceFolders": folders}
+        self.server = self.request("initialize", parameters)["capabilities"]
         self.notify("initialized", {})
         self.texts: dict[str, str] = {}
         self.cursor: dict[str, Any] | None = None

@@ -1,0 +1,54 @@
+"""The process of the whole-file checks: what it knows of many scenes, and that it lives on."""
+
+from __future__ import annotations
+
+import queue
+
+import pytest
+from plsys.compiler.analysis import Checker, Project
+from plsys.compiler.analysis.whole import MAX_KNOWN
+
+
+@pytest.fixture
+def results():
+    return queue.Queue()
+
+
+@pytest.fixture
+def checker(results):
+    checker = Checker(results.put)
+    yield checker
+    checker.close()
+
+
+def codes(checker: Checker, results: queue.Queue, scene, document) -> list[str]:
+    scene.work()
+    checker.want(scene)
+    checker.go()
+    while not checker.is_idle or not results.empty():
+        results.get(timeout=60).apply()
+    return sorted(message.diagnostic.code for message in scene.messages(document))
+
+
+def test_more_scenes_than_it_keeps(checker, results):
+    project, text = Project(), b"camera { }\nlight_source { <0, 0, 9> color rgb 1 }\nobject { A }\nSelection A { A -> box; }\n"
+    documents = [project.open(None, text, name=str(i)) for i in range(MAX_KNOWN + 4)]
+    for _ in range(2):
+        for document in documents:
+            scene = project.scene_of(document)
+            assert codes(checker, results, scene, document) == []
+            project.edit(document, len(document.text), len(document.text), b"Selection B { B -> box; }\n")
+            assert codes(checker, results, scene, document) == ["unreachable"]
+            project.edit(document, len(text), len(document.text), b"")
+
+
+def test_scenes_that_were_closed_are_left_out(checker, results):
+    project = Project()
+    document = project.open(None, b"object { A }\nSelection A { A -> box; }\n", name="a")
+    scene = project.scene_of(document)
+    checker.want(scene)
+    project.close(document)
+    project.documents.clear()
+    scene.root.scenes.clear()
+    checker.go()
+    assert checker.is_idle
