@@ -122,7 +122,7 @@ class Namespace:
         if node is None:
             return self._signatures.pop(name, None) is not None
         several = sum(map(len, self.definers.get(name, {}).values())) > 1
-        signature = (_signature(node, kind), id(node) if several else 0)
+        signature = (_signature(node, kind), id(node) if several else 0, self.is_unfinished(name))
         if self._signatures.get(name) == signature:
             return False
         self._signatures[name] = signature
@@ -139,6 +139,11 @@ class Namespace:
             return found[0][1].node, found[0][1].kind
         writers = self.writers.get(name)
         return (next(iter(writers.values()))[0], "parameter") if writers else (None, "")
+
+    def is_unfinished(self, name: str) -> bool:
+        """Whether ``name`` is a Calculation that is being typed: what it assigns isn't known yet."""
+        found = self.definers.get(name, {}).items()
+        return any(facts_of(block).is_broken and any(each.kind == "calculation" for each in several) for block, several in found)
 
     def renew(self, definition: Definition) -> Entry | None:
         """Forget the value of the entry that ``definition`` makes; the entry, if it makes one."""

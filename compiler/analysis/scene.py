@@ -185,7 +185,10 @@ class Scene:
             pass  # the whole-file checks, which have more room, report it
         finally:
             resolver.close()
-        if not self._messages.get(block, True):
+        found = self._messages.get(block)
+        if found and any(self._names.is_unfinished(each.name) for each in facts.names):
+            found[:] = [each for each in found if each.code != "unknown-name"]
+        if found is not None and not found:
             del self._messages[block]
 
     # --- included files

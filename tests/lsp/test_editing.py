@@ -126,3 +126,14 @@ def test_a_header_that_is_being_typed_floods_nothing():
     for cut in ("Selection Tree(", "Selection Tree(n,", "Selection Tree(n, m)"):
         found = from_scratch(Path("scene.plsys"), text[: text.index(cut) + len(cut)].encode())
         assert found and {each[2] for each in found} <= set(SYNTAX)
+
+
+def test_what_a_calculation_assigns_is_not_missed_while_it_is_typed():
+    rules = "object { Tree }\nSelection Tree { Tree -> C_start T_up box; }\nTransformation T_up { trans 0 0 height; }\n"
+    typed = rules.replace("T_up box", "[ trans 0 0 width ] box") + "Calculation C_start { height = 2 * (1; }"
+    assert {each[2] for each in from_scratch(Path("scene.plsys"), typed.encode())} <= {*SYNTAX, "unknown-name"}
+    project = Project()
+    document = project.open(Path("scene.plsys"), typed.encode())
+    assert "width" not in str(said(project, document))
+    project.edit(document, typed.index("(1"), typed.index("(1") + 1, b"")
+    assert "width" in str(said(project, document))  # now it is known that nothing assigns it
