@@ -213,16 +213,17 @@ def all_of_cursors(bench: Bench, count: int) -> None:
 
 
 def checks(bench: Bench, count: int) -> None:
-    """A tree's object becomes a sphere and a tree again: that nothing uses the tree shows in the whole scene only."""
-    lines = [i for i, text in enumerate(bench.lines) if text.startswith("object { Tree")]
+    """A Transformation becomes singular and whole again, which the checks of what is used tell."""
+    lines = [i for i, text in enumerate(bench.lines) if text.endswith("{ scale 0.15 0.15 2; }")]
     for line in bench.random.sample(lines, min(count, len(lines))):
-        place, tree = {"line": line, "character": 9}, bench.lines[line][9:].split(" ")[0]
-        for old, new in ((tree, "sphere"), ("sphere", tree)):
+        place = {"line": line, "character": len(bench.lines[line]) - 4}
+        for digit in "02":
             bench.version += 1
             started = bench.start()
-            bench.client.change(bench.uri, bench.version, {**deletion(place, len(old)), "text": new})
-            bench.diagnostics(lambda found: any(each["code"] == "unreachable" for each in found) is (new == "sphere"))
-            bench.note("edit → whole-file checks", started)
+            bench.client.change(bench.uri, bench.version, {**deletion(place, 1), "text": digit})
+            bench.diagnostics(lambda found: any(each["code"] == "singular" for each in found) is (digit == "0"))
+            if digit == "0":  # the message goes with the text
+                bench.note("edit → whole-file checks", started)
 
 
 def burst(bench: Bench, count: int) -> None:
