@@ -314,15 +314,18 @@ static bool follow_both(pl_shader *shader, const pl_spotted *at, pl_error *error
 
 /* --- a sample --- */
 
-static pl_ray ray_of(const pl_shader *shader, const pl_bounce *bounce)
+/* Written in place: a structure that is put together and then copied waits for its parts to reach the cache. */
+static void set_ray(const pl_shader *shader, const pl_bounce *bounce, pl_ray *ray)
 {
-    pl_ray ray = {.t_min = bounce->t_min,
-                  .t_max = shader->view->povray_epsilon ? POVRAY_FARTHEST : INFINITY,
-                  .width = bounce->width,
-                  .spread = shader->view->spread};
-    memcpy(ray.origin, bounce->origin, sizeof ray.origin);
-    memcpy(ray.direction, bounce->direction, sizeof ray.direction);
-    return ray;
+    for (int axis = 0; axis < 3; axis++) {
+        ray->origin[axis] = bounce->origin[axis];
+        ray->direction[axis] = bounce->direction[axis];
+    }
+    ray->t_min = bounce->t_min;
+    ray->t_max = shader->view->povray_epsilon ? POVRAY_FARTHEST : INFINITY;
+    ray->shadow = false;
+    ray->width = bounce->width;
+    ray->spread = shader->view->spread;
 }
 
 /* What the surface needs for shading: everything that the tracer's next call may overwrite is copied. */
@@ -382,30 +385,34 @@ static bool find_first(pl_shader *shader, const pl_ray *ray, pl_surface *surface
     return true;
 }
 
-static pl_bounce eye_ray(const pl_shader *shader, const double direction[3])
+static void set_eye_ray(const pl_shader *shader, const double direction[3], pl_bounce *eye)
 {
-    pl_bounce eye = {
-        .share = {1.0, 1.0, 1.0},
-        .weight = 1.0,
-        .t_min = shader->view->povray_epsilon ? nextafter(POVRAY_LEAST, 0.0) : 0.0,
-    };
-    memcpy(eye.origin, shader->view->camera.location, sizeof eye.origin);
-    memcpy(eye.direction, direction, sizeof eye.direction);
-    return eye;
+    for (int axis = 0; axis < 3; axis++) {
+        eye->origin[axis] = shader->view->camera.location[axis];
+        eye->direction[axis] = direction[axis];
+        eye->share[axis] = 1.0;
+    }
+    eye->t_min = shader->view->povray_epsilon ? nextafter(POVRAY_LEAST, 0.0) : 0.0;
+    eye->width = 0.0;
+    eye->weight = 1.0;
+    eye->level = 0;
 }
 
 bool pl_shade_first(pl_shader *shader, const double direction[3], pl_first *first, pl_error *error)
 {
-    const pl_bounce eye = eye_ray(shader, direction);
-    const pl_ray ray = ray_of(shader, &eye);
+    pl_bounce eye;
+    pl_ray ray;
     pl_surface surface;
+    set_eye_ray(shader, direction, &eye);
+    set_ray(shader, &eye, &ray);
     return find_first(shader, &ray, &surface, first, error);
 }
 
 bool pl_shade(pl_shader *shader, const double direction[3], double color[3], pl_first *first, pl_error *error)
 {
     const pl_view *view = shader->view;
-    pl_bounce bounce = eye_ray(shader, direction);
+    pl_bounce bounce;
+    set_eye_ray(shader, direction, &bounce);
     memset(color, 0, 3 * sizeof *color);
     shader->count = 0;
     shader->sample_rays = 0;
@@ -413,8 +420,9 @@ bool pl_shade(pl_shader *shader, const double direction[3], double color[3], pl_
         return !first || pl_shade_first(shader, direction, first, error);
     bounce.level = 1;
     for (bool is_eye = true;; is_eye = false) {
-        const pl_ray ray = ray_of(shader, &bounce);
+        pl_ray ray;
         pl_surface surface;
+        set_ray(shader, &bounce, &ray);
         pl_spotted at;
         if (!(is_eye ? find_first(shader, &ray, &surface, first, error) : find(shader, &ray, &surface, error)))
             return false;
