@@ -190,6 +190,23 @@ def forest(bench: Bench) -> None:
         same_hits(bench, case, last[1])
 
 
+def terrain(bench: Bench) -> None:
+    """Midpoint displacement: 2,097,152 different triangles, against Embree on the same ones."""
+    case = Case("terrain", "terrain", {"level": 8 if bench.quick else 10}, bench.folder)
+    scene = write_embree(case.folder / "triangles.bin", [(TRIANGLES, case.triangles())], [])
+    last = against_embree(bench, case, scene, {}, {"coherent": 1.0, "random": 1.0}, "of Embree triangles, single rays")
+    if not last:
+        return
+    bench.results.row(
+        case.name, "memory, of Embree's", 100 * last[0]["scene_bytes"] / last[1]["bytes"], 25, " %", at_most=True,
+        ours=size(last[0]["scene_bytes"]), theirs=size(last[1]["bytes"]),
+    )  # fmt: skip
+    bench.results.note(
+        case.name, f"{last[0]['primitives']:,} triangles built in {last[0]['build_seconds']:.2f} s, Embree's in {last[1]['build_seconds']:.2f} s"
+    )
+    same_hits(bench, case, last[1])
+
+
 def fern(bench: Bench) -> None:
     """Barnsley's fern, endless, cut off at one pixel: rays of pictures, since a cut-off needs pixels."""
     case = Case("endless fern", "fern_endless", {}, bench.folder)

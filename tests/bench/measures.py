@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from against_peers import fern, figure, forest, menger, order20
+from against_peers import fern, figure, forest, menger, order20, terrain
 from own_curves import fronts, growth, scatter, threads
 from whole_process import split_by_hand, start, unique
 
@@ -14,6 +14,7 @@ MEASURES = {
     "forest": forest,
     "unique": unique,
     "fern": fern,
+    "terrain": terrain,
     "scatter": scatter,
     "threads": threads,
     "mitsuba": split_by_hand,

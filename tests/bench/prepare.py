@@ -89,6 +89,15 @@ class Case:
                 file.write(rays.astype("<f4").tobytes())
         return path
 
+    def triangles(self) -> np.ndarray:
+        """(n, 9): the corners of generated triangles, in single precision as Embree has them."""
+        parts = []
+        for batch in unfold(self.compilation.graph):
+            m = batch.matrix[np.asarray(batch.symbol) >= 0]
+            foot = m[:, :, 3]
+            parts.append(np.hstack([foot, foot + m[:, :, 0], foot + m[:, :, 1]]).astype(np.float32))
+        return np.concatenate(parts)
+
     def unfolded(self):
         """kinds (n,) names, matrices (n, 3, 4), arguments (n,), parameters (n, slots) of all generated primitives."""
         batches = [b.take(b.symbol >= 0) for b in unfold(self.compilation.graph)]

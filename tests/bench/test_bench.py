@@ -60,6 +60,17 @@ def test_geometry_has_the_size_of_the_unfolding(tmp_path):
     assert len(triangles_of(quads.reshape(-1, 12))) == 240
 
 
+def test_triangles_are_those_of_the_runtime(tmp_path):
+    case = Case("hills", "terrain", {"level": 3}, tmp_path, size=(32, 24))
+    corners = case.triangles().reshape(-1, 3, 3).astype(float)
+    assert corners.shape == (128, 3, 3)
+    with Scene(case.compilation.encode()) as scene:
+        centres = corners.mean(axis=1)
+        hits = scene.intersect(centres + [0, 0, 100], np.array([[0.0, 0, -1]]))
+    np.testing.assert_allclose(hits.t, 100, atol=1e-4)
+    assert sorted(hits.primitive) == list(range(128))
+
+
 def test_the_tree_split_by_hand_is_the_tree(tmp_path):
     case = Case("tree", "tree", {"order": 6}, tmp_path)
     lower, upper, places = split_tree(case)
