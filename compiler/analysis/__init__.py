@@ -25,6 +25,7 @@ from . import queries
 from .actions import Action, TextEdit
 from .document import Document, Meaning, Message, Outline, Place
 from .facts import Definition, Facts, Name, facts_of
+from .keys import enters_keys
 from .fixes import fix_all, fixes, ignoring
 from .folders import SUFFIX as SCENE_SUFFIX
 from .folders import Folders, Found
@@ -41,6 +42,6 @@ from .whole import run as check_whole
 __all__ = [
     "Action", "Block", "CODES", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Folders",
     "Formatted", "Found", "GuardInsight", "Insight", "Meaning", "Message", "Motion", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
-    "SCENE_SUFFIX", "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "facts_of", "fix_all", "fixes",
+    "SCENE_SUFFIX", "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "enters_keys", "facts_of", "fix_all", "fixes",
     "format_document", "ignoring", "insights_in", "insights_of", "motion_of", "nearest", "queries", "refactorings", "syntax", "vocabulary",
 ]  # fmt: skip

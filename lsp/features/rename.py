@@ -9,9 +9,16 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from plsys.compiler.analysis import Document, Place, Scene, facts_of, vocabulary
+from plsys.compiler.analysis import Document, Place, Scene, enters_keys, facts_of, vocabulary
 from plsys.lsp.request import Feature, Request
 from plsys.lsp.session import Refused
+
+# Names enter random keys (see analysis/keys.py).
+_KEYS = {
+    "label": "Rename: random numbers below this name change",
+    "needsConfirmation": True,
+    "description": "the name is part of the random key, so the scene's plants will look different",
+}
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -43,7 +50,7 @@ def rename(request: Request) -> dict[str, Any] | None:
     edits: dict[Document, list[dict]] = {}
     for place in sorted(places.values(), key=lambda each: each.start):
         edits.setdefault(place.document, []).append({"range": request.workspace.range(place), "newText": new})
-    return _workspace_edit(request, edits)
+    return _workspace_edit(request, edits, any(enters_keys(scene, name) for scene in scenes))
 
 
 def _renameable(request: Request) -> tuple[str, Place] | None:
@@ -90,11 +97,16 @@ def _lost(old: str, new: str, places: list[Place]) -> Place | None:
     return None
 
 
-def _workspace_edit(request: Request, edits: dict[Document, list[dict]]) -> dict[str, Any]:
+def _workspace_edit(request: Request, edits: dict[Document, list[dict]], changes_plants: bool) -> dict[str, Any]:
+    """``changes_plants``: the editor asks before it renames, if it can."""
     uris = {document: request.workspace.uri(document) for document in edits}
     if not request.supports("workspace", "workspaceEdit", "documentChanges"):
         return {"changes": {uris[document]: found for document, found in edits.items()}}
-    return {
+    annotated = changes_plants and request.supports("workspace", "workspaceEdit", "changeAnnotationSupport") is not None
+    for edit in (each for found in edits.values() for each in found) if annotated else ():
+        edit["annotationId"] = "keys"
+    more = {"changeAnnotations": {"keys": _KEYS}} if annotated else {}
+    return more | {
         "documentChanges": [
             {"textDocument": {"uri": uris[document], "version": document.version}, "edits": found}
             for document, found in edits.items()

@@ -109,3 +109,26 @@ def test_prepare():
         Editor(SCENE.replace("<cursor>", "").replace("sphere", "sph<cursor>ere")).at_cursor("textDocument/prepareRename")
     with pytest.raises(Refusal, match="nothing defines 'Tee'"):
         Editor("object { Te<cursor>e }\n").at_cursor("textDocument/prepareRename")
+
+
+DRAWING = """\
+object { Tree }
+Selection Tree { C_kind Tree; Tree -> [ trans 0 0 1 ] Twig + Leaf; }
+Selection Twig { Twig -> T_lean box; }
+Selection Leaf { Leaf -> sphere; }
+Calculation C_kind { variants 3; }
+Transformation T_lean { roty 90*rand(0); }
+"""
+
+
+@pytest.mark.parametrize("name, asks", [("Tree", True), ("Twig", True), ("C_kind", True), ("Leaf", False), ("T_lean", False)])
+def test_a_name_that_enters_random_keys_is_renamed_after_a_question(name, asks):
+    """The editor shows the annotation and asks; one that has none for edits renames as ever."""
+    marked = DRAWING.replace(f" {name} {{", f" <cursor>{name} {{", 1) if name != "Tree" else DRAWING.replace("Selection Tree", "Selection <cursor>Tree")
+    client = {"workspace": {"workspaceEdit": {"documentChanges": True, "changeAnnotationSupport": {}}}}
+    answer = Editor(marked, client=client).at_cursor("textDocument/rename", newName="Other")
+    edits = [edit for change in answer["documentChanges"] for edit in change["edits"]]
+    assert len(edits) >= 2 and all(("annotationId" in edit) == asks for edit in edits)
+    assert ("changeAnnotations" in answer) == asks
+    plain = Editor(marked).at_cursor("textDocument/rename", newName="Other")
+    assert all("annotationId" not in edit for edits in plain["changes"].values() for edit in edits)
