@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_scenes import scenes
 
-from plsys.compiler.analysis import refactorings
+from plsys.compiler.analysis import facts_of, refactorings
 from plsys.compiler.export.unfold import unfold
 from plsys.compiler.pipeline import build
 from plsys.compiler.reading.source import Source
@@ -167,6 +169,27 @@ def test_other_entry_actions_stay(entry):
 
 def test_broken_blocks_are_left_alone():
     assert refactored("Selection <cursor>A { [ n = 3 ] A; A -> box + [ --n A; }\n") == {}
+
+
+# --- real scenes
+
+SCENES = ("bush", "mirrors", "palm", "tower", "tree")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_real_scenes_keep_their_derivation(name):
+    """Refactorings at the names and brackets of a scene, some of them at random."""
+    path = Path(__file__).resolve().parents[3] / f"scenes/{name}.plsys"
+    text = path.read_text()
+    scene, document = opened(text)
+    parts = zip(document.text.blocks, document.text.starts)
+    places = [base + each.start for block, base in parts for each in facts_of(block).names]
+    places += [match.start() + 1 for match in re.finditer(r"\[", text)]
+    found = {action.title: action for at in places for action in refactorings(scene, document, at, at)}
+    wanted = [action for title, action in sorted(found.items()) if not title.startswith("Bound")]
+    assert wanted
+    for action in random.Random(name).sample(wanted, min(len(wanted), 4)):
+        assert same_derivation(text, applied(text, action)), action.title
 
 
 # --- random scenes
