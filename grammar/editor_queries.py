@@ -57,7 +57,12 @@ EMACS = {
 DROPPED = {"helix": ("indent.end", "indent.ignore")}
 
 # Where what is special stands after what is general, editors have to be told.
-NOTES = {("emacs", "highlights"): "; For treesit-font-lock-rules with :override t: the last pattern that fits a name counts.\n\n"}
+NOTES = {
+    (
+        "emacs",
+        "highlights",
+    ): "; For treesit-font-lock-rules with :override t: the last pattern that fits a name counts.\n\n"
+}
 
 EDITORS = {
     "neovim": (NEOVIM, ("highlights", "folds", "indents", "locals")),

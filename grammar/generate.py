@@ -135,7 +135,11 @@ def highlights(table: dict, current: str) -> str:
     """``current``, the text of highlights.scm, with the lists between the markers renewed."""
     lines = [BEGIN]
     for capture, kinds in HIGHLIGHTS:
-        groups = [group for kind in kinds for group in (table[kind].values() if kind == "property" else (table[kind],))]
+        groups = [
+            group
+            for kind in kinds
+            for group in (table[kind].values() if kind == "property" else (table[kind],))
+        ]
         names = dict.fromkeys(name for group in groups for name in group)
         place = "(name) {}" if "property" not in kinds else IN_BLOCKS
         lines += [
@@ -160,7 +164,9 @@ def outputs() -> dict[Path, str]:
     queries = HERE / "queries/highlights.scm"
     if queries.exists():
         files[queries] = highlights(table, queries.read_text(encoding="utf-8"))
-    return files | editor_queries.outputs({path.name: text for path, text in files.items() if path == queries})
+    return files | editor_queries.outputs(
+        {path.name: text for path, text in files.items() if path == queries}
+    )
 
 
 def main(arguments: list[str]) -> int:

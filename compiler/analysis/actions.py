@@ -133,7 +133,9 @@ def terms(node: object) -> Iterator[syntax.Term]:
                         yield from terms(item.union)
 
 
-def rules(node: syntax.Production | None, inside: syntax.If | None = None) -> Iterator[tuple[syntax.Rule, syntax.If | None]]:
+def rules(
+    node: syntax.Production | None, inside: syntax.If | None = None
+) -> Iterator[tuple[syntax.Rule, syntax.If | None]]:
     """The rules of a production, each with the `if` whose ``then`` it is (None: it has no condition of its own)."""
     while isinstance(node, syntax.If):
         yield from rules(node.then, node)
@@ -151,5 +153,3 @@ def name_of(item: object) -> syntax.Name | None:
 
 def uses_at(scene: Scene, name: str, roles: tuple[str, ...] = ("read",)) -> list[Place]:
     return [place for place in scene.uses(name) if place.role in roles]
-
-

@@ -55,9 +55,14 @@ def bounded(spot: Spot, node: syntax.Selection) -> list[TextEdit]:
             ]
             if not found:
                 continue
-            edits += [spot.edit(base + item.span.start, base + item.span.start, f"[ --{counter} ] ") for item in found]
+            edits += [
+                spot.edit(base + item.span.start, base + item.span.start, f"[ --{counter} ] ")
+                for item in found
+            ]
             if guard is None:
-                edits.append(spot.edit(base + rule.span.start, base + rule.span.start, f"if ({counter} > 0) "))
+                edits.append(
+                    spot.edit(base + rule.span.start, base + rule.span.start, f"if ({counter} > 0) ")
+                )
                 continue
             start, end = base + guard.test.span.start, base + guard.test.span.end
             needs_brackets = isinstance(guard.test, syntax.Conditional) or (

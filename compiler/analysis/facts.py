@@ -87,7 +87,9 @@ class Facts:
     def names(self) -> list[Name]:
         """All occurrences of names that may be the scene's own, in text order."""
         found = [name for node in self.file.definitions for name in _names_of(node)]
-        return sorted({(name.start, name.end): name for name in found if name.name}.values(), key=lambda n: n.start)
+        return sorted(
+            {(name.start, name.end): name for name in found if name.name}.values(), key=lambda n: n.start
+        )
 
     @property
     def is_broken(self) -> bool:
@@ -212,8 +214,10 @@ def _items(items: tuple, words: frozenset[str]) -> Iterator[Name]:
             yield from _block(item)
         elif isinstance(item, syntax.MapEntry):
             yield from _items(item.items, _words_of(""))
-        elif isinstance(item, syntax.Name) and item.name in words and not (
-            needs_value and item.name not in vocabulary.COLOUR_WORDS
+        elif (
+            isinstance(item, syntax.Name)
+            and item.name in words
+            and not (needs_value and item.name not in vocabulary.COLOUR_WORDS)
         ):
             needs_value = item.name not in _FLAGS
             continue

@@ -42,7 +42,11 @@ def fixes(scene: Scene, document: Document, message: Message) -> Iterator[Action
     found = message.diagnostic
     preferred = True
     seen: set[tuple] = set()
-    sources = [(found.hint, BY_HINT[:1]), (found.message, FIXES.get(found.code, ())), (found.hint, BY_HINT[1:])]
+    sources = [
+        (found.hint, BY_HINT[:1]),
+        (found.message, FIXES.get(found.code, ())),
+        (found.hint, BY_HINT[1:]),
+    ]
     if found.mend is not None:
         yield _mended(spot, found.mend, message)
         return
@@ -78,7 +82,9 @@ def _touch(first: TextEdit, second: TextEdit) -> bool:
 def _mended(spot: Spot, mend: str, message: Message) -> Action:
     """The action for a message that brings its mend along."""
     if not mend:
-        return Action(f"Remove '{spot.text.strip()}'", "quickfix", (spot.cut(spot.start, spot.end),), True, message)
+        return Action(
+            f"Remove '{spot.text.strip()}'", "quickfix", (spot.cut(spot.start, spot.end),), True, message
+        )
     written = mend.strip() or mend
     return Action(f"Write '{short(written)}'", "quickfix", (spot.replace(mend),), True, message)
 

@@ -40,8 +40,14 @@ def rename_definition(spot: Spot, match: re.Match, message: Message) -> Found:
     if node is None or isinstance(node, syntax.Include | syntax.Block):
         return None
     old, new = node.name.name, fresh_name(spot.scene, f"my_{node.name.name}")
-    own = [name for name in spot.facts.names if node.span.start <= name.start < node.span.end and name.name == old]
-    edits = [spot.edit(spot.base + name.start, spot.base + name.end, new) for name in own if name.role != "read"]
+    own = [
+        name
+        for name in spot.facts.names
+        if node.span.start <= name.start < node.span.end and name.name == old
+    ]
+    edits = [
+        spot.edit(spot.base + name.start, spot.base + name.end, new) for name in own if name.role != "read"
+    ]
     return f"Rename it to '{new}'", edits
 
 
@@ -85,7 +91,11 @@ def _role(spot: Spot) -> tuple[str, ...] | None:
         block = parent.parent.child_by_field_name("name")
         word = block.text.decode() if block is not None else ""
         return ("Selection",) if word == "object" else None
-    return ("value",) if parent.type in ("binary", "unary", "operation", "assignment", "vector", "parenthesized") else None
+    return (
+        ("value",)
+        if parent.type in ("binary", "unary", "operation", "assignment", "vector", "parenthesized")
+        else None
+    )
 
 
 def operand_sum(spot: Spot, match: re.Match, message: Message) -> Found:
@@ -129,9 +139,15 @@ def bound(spot: Spot, match: re.Match, message: Message) -> Found:
 
 def count_down(spot: Spot, match: re.Match, message: Message) -> Found:
     counter = re.search(r"\[ (--\w+)", message.diagnostic.hint)
-    if counter is None or not isinstance(spot.definition, syntax.Selection) or spot.slice(spot.start, spot.end) == "":
+    if (
+        counter is None
+        or not isinstance(spot.definition, syntax.Selection)
+        or spot.slice(spot.start, spot.end) == ""
+    ):
         return None
-    return f"Change it on the way: [ {counter[1]} ]", [spot.edit(spot.start, spot.start, f"[ {counter[1]} ] ")]
+    return f"Change it on the way: [ {counter[1]} ]", [
+        spot.edit(spot.start, spot.start, f"[ {counter[1]} ] ")
+    ]
 
 
 def count_the_other_way(spot: Spot, match: re.Match, message: Message) -> Found:
@@ -158,7 +174,9 @@ def assign_at_entry(spot: Spot, match: re.Match, message: Message) -> Found:
     meaning = spot.scene.meaning(owner)
     if meaning is None or not isinstance(meaning.node, syntax.Selection):
         return None
-    return f"Assign '{name}' in the entry action of '{owner}'", [entry_edit(spot, meaning.node, f"{name} = 0")]
+    return f"Assign '{name}' in the entry action of '{owner}'", [
+        entry_edit(spot, meaning.node, f"{name} = 0")
+    ]
 
 
 def entry_edit(spot: Spot, node: syntax.Selection, statements: str) -> TextEdit:
@@ -241,7 +259,9 @@ def remove_property(spot: Spot, match: re.Match, message: Message) -> Found:
 def _property(spot: Spot) -> tuple[int, int] | None:
     """Where the property or block at the spot starts and ends, with its values."""
     node, base = spot.document.node_at(spot.start)
-    while node is not None and node.parent is not None and node.parent.type not in ("block_body", "source_file"):
+    while (
+        node is not None and node.parent is not None and node.parent.type not in ("block_body", "source_file")
+    ):
         node = node.parent
     if node is None or node.parent is None:
         return None

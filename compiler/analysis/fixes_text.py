@@ -49,7 +49,7 @@ def write_hint(spot: Spot, match: re.Match, message: Message) -> Found:
 
 
 def suggestion(spot: Spot, match: re.Match, message: Message) -> Found:
-    """"did you mean 'Tree'?": replace the last word of the spot that isn't it."""
+    """ "did you mean 'Tree'?": replace the last word of the spot that isn't it."""
     if spot.start == spot.end or "\n" in spot.text:
         return None
     return f"Replace by '{match[1]}'", [spot.replace(match[1])]
@@ -92,7 +92,10 @@ def without_braces(spot: Spot, match: re.Match, message: Message) -> Found:
     if parent is None or parent.children[-1].type != "}":
         return None
     closer = parent.children[-1]
-    return "Remove the braces", [spot.cut(spot.start, spot.end), spot.cut(base + closer.start_byte, base + closer.end_byte)]
+    return "Remove the braces", [
+        spot.cut(spot.start, spot.end),
+        spot.cut(base + closer.start_byte, base + closer.end_byte),
+    ]
 
 
 def angle_brackets(spot: Spot, match: re.Match, message: Message) -> Found:
@@ -100,7 +103,10 @@ def angle_brackets(spot: Spot, match: re.Match, message: Message) -> Found:
     closer = node.parent.children[-1]
     if closer.type != ")":
         return None
-    return "Write it as a vector <…>", [spot.replace("<"), spot.edit(base + closer.start_byte, base + closer.end_byte, ">")]
+    return "Write it as a vector <…>", [
+        spot.replace("<"),
+        spot.edit(base + closer.start_byte, base + closer.end_byte, ">"),
+    ]
 
 
 def touching_product(spot: Spot, match: re.Match, message: Message) -> Found:
@@ -188,9 +194,7 @@ TEXT_FIXES = {
         (r"this comment is never closed", close_comment),
     ),
     "encoding": ((r"NUL byte|not UTF-8", remove),),
-    "wrong-arguments": (
-        (_WRITE, write_hint),
-    ),
+    "wrong-arguments": ((_WRITE, write_hint),),
     "unsupported": ((r"^#local isn't", replace("#declare")),),
 }
 

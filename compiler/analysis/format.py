@@ -51,13 +51,19 @@ def format_document(document: Document, start: int = 0, end: int | None = None) 
         edits += [Edit(base + edit.start, base + edit.end, edit.data) for edit in found]
     if start > 0 or end < len(text):
         low, high = text.line_start(text.line_of(start)), text.line_start(text.line_of(end) + 1)
-        edits = [_within(edit, low) for edit in edits if low <= edit.end < high or edit.end == high == len(text)]
+        edits = [
+            _within(edit, low) for edit in edits if low <= edit.end < high or edit.end == high == len(text)
+        ]
     return Formatted(document, edits, skipped)
 
 
 def line_end_of(document: Document) -> bytes:
     """What ends the document's first line."""
-    ends = (block.data[max(0, start - 2) : start] for block in document.text.blocks for start in block.line_starts[1:2])
+    ends = (
+        block.data[max(0, start - 2) : start]
+        for block in document.text.blocks
+        for start in block.line_starts[1:2]
+    )
     first = next(ends, b"\n")
     return first if first == b"\r\n" else first[-1:]
 

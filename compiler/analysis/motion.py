@@ -66,7 +66,9 @@ def motion_of(scene: Scene, statements: tuple[syntax.Statement, ...]) -> Motion 
     if not steps or not is_finite(matrix):
         return None
     stretches = _singular_values(matrix)
-    return Motion(matrix, determinant(matrix), (stretches[0], stretches[2]), _turn(matrix, stretches), is_constant)
+    return Motion(
+        matrix, determinant(matrix), (stretches[0], stretches[2]), _turn(matrix, stretches), is_constant
+    )
 
 
 def _value(scene: Scene, argument: syntax.Expression) -> tuple[float, bool] | None:
@@ -82,7 +84,9 @@ def constant_of(scene: Scene, node: syntax.Expression) -> float | None:
     """The number that an expression of the scene stands for; None if it isn't a constant."""
     if isinstance(node, syntax.Number):
         return node.value
-    expressions = BlockResolver(node.span.source, Diagnostics(), scene.entries, lambda name, kinds: "").expressions
+    expressions = BlockResolver(
+        node.span.source, Diagnostics(), scene.entries, lambda name, kinds: ""
+    ).expressions
     try:
         return expressions.constant(node)
     except (Problem, RecursionError):
@@ -91,7 +95,11 @@ def constant_of(scene: Scene, node: syntax.Expression) -> float | None:
 
 def _first_value(scene: Scene, span: Span) -> float | None:
     for start, end, insight in scene.insights.get(span.source, ()):
-        if (start, end) == (span.start, span.end) and getattr(insight, "kind", "") == "argument" and insight.certain:
+        if (
+            (start, end) == (span.start, span.end)
+            and getattr(insight, "kind", "") == "argument"
+            and insight.certain
+        ):
             return insight.first
     return None
 

@@ -50,7 +50,11 @@ def parameterised(spot: Spot, node: syntax.Selection) -> Iterator[Action]:
         if use.owner in inside and use.operator is not None and (changed := _changed(use.operator, names)):
             current = {**current, changed[0]: changed[1]}
             begin = use.base + use.operator.span.start
-        edits.append(TextEdit(use.place.document, begin, use.place.end, f"{name}({', '.join(current[n] for n in names)})"))
+        edits.append(
+            TextEdit(
+                use.place.document, begin, use.place.end, f"{name}({', '.join(current[n] for n in names)})"
+            )
+        )
     title = f"Turn into the parameterised symbol {name}({', '.join(names)})"
     yield Action(title, "refactor.rewrite", tuple(edits))
 
@@ -70,7 +74,11 @@ def _entry(spot: Spot, node: syntax.Selection) -> tuple[dict[str, str], list[Tex
         statements = operator.statements
     else:
         meaning = spot.scene.meaning(operator.name) if isinstance(operator, syntax.Name) else None
-        if meaning is None or not isinstance(meaning.node, syntax.Calculation) or len(meaning.definitions) != 1:
+        if (
+            meaning is None
+            or not isinstance(meaning.node, syntax.Calculation)
+            or len(meaning.definitions) != 1
+        ):
             return None
         if len(uses_at(spot.scene, operator.name)) != 1 or facts_of(meaning.node.span.source).is_broken:
             return None
@@ -80,7 +88,11 @@ def _entry(spot: Spot, node: syntax.Selection) -> tuple[dict[str, str], list[Tex
         edits.append(Spot(spot.scene, place.document, place.start, place.end).cut(place.start, place.end))
     values: dict[str, str] = {}
     for statement in statements:
-        if not isinstance(statement, syntax.Assignment) or statement.operator != "=" or statement.target.name in values:
+        if (
+            not isinstance(statement, syntax.Assignment)
+            or statement.operator != "="
+            or statement.target.name in values
+        ):
             return None
         if not _is_constant(spot.scene, statement.value):
             return None
@@ -95,7 +107,9 @@ def _is_constant(scene: Scene, value: syntax.Expression | None) -> bool:
             return True
         case syntax.Name():
             entry = scene.entries.get(value.name)
-            return vocabulary.kind_of(value.name) == "constant" or (entry is not None and entry.kind in ("value", "input"))
+            return vocabulary.kind_of(value.name) == "constant" or (
+                entry is not None and entry.kind in ("value", "input")
+            )
         case syntax.Unary():
             return _is_constant(scene, value.operand)
         case syntax.Binary():
@@ -112,7 +126,9 @@ def _uses(scene: Scene, name: str) -> list[_Use] | None:
         block, base = place.document.text.block_at(place.start)
         if facts_of(block).is_broken:
             return None
-        use = next((u for node in facts_of(block).file.definitions for u in _uses_in(node, place, base)), None)
+        use = next(
+            (u for node in facts_of(block).file.definitions for u in _uses_in(node, place, base)), None
+        )
         if use is None:
             return None
         if use.owner != "entry":

@@ -52,7 +52,9 @@ def _extract(spot: Spot) -> Iterator[Action]:
     at = spot.start - spot.base
     for term in terms(node):
         for item in term.items:
-            if not (isinstance(item, syntax.Inline) and item.span.start <= at <= item.span.end and item.statements):
+            if not (
+                isinstance(item, syntax.Inline) and item.span.start <= at <= item.span.end and item.statements
+            ):
                 continue
             kinds = {_kind(statement) for statement in item.statements}
             if len(kinds) != 1:
@@ -74,7 +76,12 @@ def _kind(statement: syntax.Statement) -> str:
 def _statements(spot: Spot, statements: tuple[syntax.Statement, ...], base: int | None = None) -> str:
     """The text of statements without the last ``;``, comments between them included."""
     base = spot.base if base is None else base
-    return spot.slice(base + statements[0].span.start, base + statements[-1].span.end).rstrip().rstrip(";").rstrip()
+    return (
+        spot.slice(base + statements[0].span.start, base + statements[-1].span.end)
+        .rstrip()
+        .rstrip(";")
+        .rstrip()
+    )
 
 
 # --- inline
@@ -87,7 +94,12 @@ def _inline(spot: Spot) -> Iterator[Action]:
     if meaning is None or not isinstance(meaning.node, syntax.Calculation | syntax.Transformation):
         return
     node, place = meaning.node, spot.scene.place(meaning.node.span)
-    if place is None or len(meaning.definitions) != 1 or not node.statements or facts_of(node.span.source).is_broken:
+    if (
+        place is None
+        or len(meaning.definitions) != 1
+        or not node.statements
+        or facts_of(node.span.source).is_broken
+    ):
         return
     if any(isinstance(each, syntax.Operation) and each.name.name == "variants" for each in node.statements):
         return  # its name is part of the random key
@@ -104,9 +116,13 @@ def _inline(spot: Spot) -> Iterator[Action]:
         yield Action(f"Inline '{node.name.name}'", "refactor.inline", (*edits, gone))
         return
     if found[1].role == "read":
-        here = tuple(edit for edit in edits if edit.document is spot.document and edit.start == found[1].start)
+        here = tuple(
+            edit for edit in edits if edit.document is spot.document and edit.start == found[1].start
+        )
         yield Action(f"Inline '{node.name.name}' here", "refactor.inline", here)
-    yield Action(f"Inline '{node.name.name}' everywhere ({len(uses)} places)", "refactor.inline", (*edits, gone))
+    yield Action(
+        f"Inline '{node.name.name}' everywhere ({len(uses)} places)", "refactor.inline", (*edits, gone)
+    )
 
 
 def _is_operator(use: Place) -> bool:
@@ -114,6 +130,8 @@ def _is_operator(use: Place) -> bool:
     block, base = use.document.text.block_at(use.start)
     for node in facts_of(block).file.definitions:
         for term in terms(node):
-            if any(isinstance(item, syntax.Name) and item.span.start == use.start - base for item in term.items):
+            if any(
+                isinstance(item, syntax.Name) and item.span.start == use.start - base for item in term.items
+            ):
                 return True
     return False

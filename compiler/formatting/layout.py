@@ -73,7 +73,9 @@ class _Layout:
         self.text, self.line_end = text, line_end
         found = tokens_of(root, text)
         self.tokens, self.units, self.anchors = found.items, found.units, found.anchors
-        self.columns = dict.fromkeys(found.anchors.values(), 0)  # where the operands stand that others align with
+        self.columns = dict.fromkeys(
+            found.anchors.values(), 0
+        )  # where the operands stand that others align with
         self.open = [_Bracket(0, 0, is_empty=False)]
         self.edits: list[Edit] = []
         self.indent = 0  # of the line that is being laid out
@@ -140,11 +142,21 @@ class _Layout:
             may_be_blank = width < -1 and before.kind not in ("{", "[", "(") and not _closes(token)
             self.indent = self._indentation(i)
             self.line_start, self.shift = token.start, 0
-            self._put(before.end, token.start, self.line_end * (2 if may_be_blank else 1) + b" " * self.indent)
+            self._put(
+                before.end, token.start, self.line_end * (2 if may_be_blank else 1) + b" " * self.indent
+            )
             return
         key = (before.kind, before.parent, token.kind, token.parent)
         comment_follows = i + 1 < len(self.tokens) and self.tokens[i + 1].is_comment
-        gap = Gap(before, token, width, abs(self.widths[i - 1]), abs(self.widths[i + 1]), bracket.width_after, comment_follows)
+        gap = Gap(
+            before,
+            token,
+            width,
+            abs(self.widths[i - 1]),
+            abs(self.widths[i + 1]),
+            bracket.width_after,
+            comment_follows,
+        )
         count, may_align = spaces(gap)
         if key not in _FIXED and is_fixed(before, token):
             _FIXED[key] = count
@@ -172,7 +184,9 @@ class _Layout:
             self.columns[token.start] = self._column(token.start)
         if _closes(token):
             self.open.pop()
-        elif token.kind in _BRACKETS and (token.kind != "<" or token.parent == "vector") and token.kind != ">":
+        elif (
+            token.kind in _BRACKETS and (token.kind != "<" or token.parent == "vector") and token.kind != ">"
+        ):
             self.open.append(_Bracket(self.indent, self.indent + INDENT, abs(self.widths[i + 1])))
 
     def _column(self, start: int) -> int:

@@ -9,12 +9,23 @@ from typing import NamedTuple
 
 from .tokens import Token
 
-_BRACKETS = {"call": "()", "parameters": "()", "parenthesized": "()", "vector": "<>", "range": "[]", "map_entry": "[]"}
-_OPENS_CLOSELY = frozenset(("call", "parameters"))  # nothing stands between these brackets and what is before them
+_BRACKETS = {
+    "call": "()",
+    "parameters": "()",
+    "parenthesized": "()",
+    "vector": "<>",
+    "range": "[]",
+    "map_entry": "[]",
+}
+_OPENS_CLOSELY = frozenset(
+    ("call", "parameters")
+)  # nothing stands between these brackets and what is before them
 _TIGHT = frozenset(("*", "/", "%"))  # as the author has them: `2*n` or `2 * n`, but not `2* n`
 
 # What has its one space, or none, and is never aligned: after the first, before the second.
-_NO_ALIGNMENT_AFTER = frozenset(("(", "[", "{", "< ", ",", "=", "arrow", "+", "|", ":", "?", "+=", "-=", "*=", "/="))
+_NO_ALIGNMENT_AFTER = frozenset(
+    ("(", "[", "{", "< ", ",", "=", "arrow", "+", "|", ":", "?", "+=", "-=", "*=", "/=")
+)
 _NO_ALIGNMENT_BEFORE = frozenset((")", "]", "+", "|", ":", "?"))
 
 
@@ -43,7 +54,9 @@ def spaces(gap: Gap) -> Spaces:
         return _beside_comment(gap)
     if kind in (";", ","):
         return Spaces(1 if before.kind == "arrow" else 0)
-    inside = _BRACKETS.get(before.parent, "")[:1] == before.kind or _BRACKETS.get(after.parent, "")[1:] == kind
+    inside = (
+        _BRACKETS.get(before.parent, "")[:1] == before.kind or _BRACKETS.get(after.parent, "")[1:] == kind
+    )
     if inside or (kind == "(" and after.parent in _OPENS_CLOSELY):
         return Spaces(0)
     if before.kind == "(":  # of a group
@@ -79,7 +92,10 @@ def _beside_operator(gap: Gap) -> Spaces:
         return Spaces(min(gap.width, 1) if after.is_operator else 0)
     if after.is_operator and after.parent == "unary":
         tight = before.is_operator and before.kind in _TIGHT
-        return Spaces(min(gap.width_before or gap.width, 1) if tight else 1, not before.is_operator and before.kind != ",")
+        return Spaces(
+            min(gap.width_before or gap.width, 1) if tight else 1,
+            not before.is_operator and before.kind != ",",
+        )
     if after.is_operator:
         if gap.comment_follows:
             return Spaces(min(gap.width, 1))

@@ -83,7 +83,12 @@ def _walk(node: Node, kind: str, text: bytes, found: Tokens) -> None:
                 end = start + len(text[start:end].rstrip())
             if name == "comment" and text[start + 1] == 0x2F:
                 name = "line_comment"
-            elif name == "<" and kind == "vector" and text[end : end + 1] == b" " and text[node.end_byte - 2] != 0x20:
+            elif (
+                name == "<"
+                and kind == "vector"
+                and text[end : end + 1] == b" "
+                and text[node.end_byte - 2] != 0x20
+            ):
                 name = "< "
             if end > start:
                 found.items.append(Token(name, kind, start, end))

@@ -36,9 +36,13 @@ def check_camera(model: Model, diagnostics: Diagnostics) -> None:
         inverse = affine.inverse(matrix)
         if inverse is None or not _is_inside(shape, affine.transform_point(inverse, camera), seed_of(model)):
             continue
-        if not any(_is_inside(shape, affine.transform_point(inverse, light), seed_of(model)) for light in lights):
+        if not any(
+            _is_inside(shape, affine.transform_point(inverse, light), seed_of(model)) for light in lights
+        ):
             message = f"the camera stands inside a {shape.shape}, where no light is"
-            diagnostics.add("camera-inside", span, message, "move its location, or put a light inside, as in a room")
+            diagnostics.add(
+                "camera-inside", span, message, "move its location, or put a light inside, as in a room"
+            )
             return
 
 
@@ -51,7 +55,11 @@ def _shapes(model: Model) -> Iterator[tuple[Primitive, affine.Matrix]]:
         for way in ways(body):  # type: ignore[arg-type]
             tried += 1
             # What stands under an undecided guard may not be there at all.
-            if any(_value(test, seed) is None for test, _ in way.guards) or way.weights or not is_open(way, seed):
+            if (
+                any(_value(test, seed) is None for test, _ in way.guards)
+                or way.weights
+                or not is_open(way, seed)
+            ):
                 continue
             inner = linear_map(way.operators, seed)
             if inner is None:

@@ -20,7 +20,12 @@ _OPPOSITE = {
     "less": "greater_equal", "greater_equal": "less", "greater": "less_equal", "less_equal": "greater",
     "equal": "not_equal", "not_equal": "equal",
 }  # fmt: skip
-_MIRRORED = {"less": "greater", "greater": "less", "less_equal": "greater_equal", "greater_equal": "less_equal"}
+_MIRRORED = {
+    "less": "greater",
+    "greater": "less",
+    "less_equal": "greater_equal",
+    "greater_equal": "less_equal",
+}
 
 
 class Interval(NamedTuple):

@@ -107,7 +107,9 @@ def _draws(way: Way) -> bool:
 def _removable(edge: Back, edges: list[Back], starts: _Starts) -> list[Back]:
     """``edge`` and others, if a guard on it shows that it is taken a limited number of times only."""
     for need in needs(edge[1]):
-        sides = [need.side] if need.side else [">", "<"] if _missed(need, edge[1], edges, starts, True) else []
+        sides = (
+            [need.side] if need.side else [">", "<"] if _missed(need, edge[1], edges, starts, True) else []
+        )
         for side in sides:
             quantity = form(need.quantity, {})
             if side == "<":
@@ -127,7 +129,11 @@ def _falls(quantity: Form, need: Need, side: str, way: Way, starts: _Starts) -> 
     if not change.factors:
         # The bounds of the quantity itself are no change: n - [c, c] both times.
         return 1 if change.high < 0 else 0 if change.high <= 0 else None
-    if len(quantity.factors) != 1 or len(change.factors) != 1 or change.factors[0][0] != quantity.factors[0][0]:
+    if (
+        len(quantity.factors) != 1
+        or len(change.factors) != 1
+        or change.factors[0][0] != quantity.factors[0][0]
+    ):
         return None
     (name, factor), (_, slope) = quantity.factors[0], change.factors[0]
     # change = slope·n + rest, and n on its side of the bound -low/factor.
@@ -152,7 +158,10 @@ def _missed(
     if need.side or len(quantity.factors) != 1 or quantity.low != quantity.high:
         return None
     name, factor = quantity.factors[0]
-    changes = {form(Read(name), after(each.operators)).plus(Form(((name, 1.0),), 0.0, 0.0), -1.0) for _, each in edges}
+    changes = {
+        form(Read(name), after(each.operators)).plus(Form(((name, 1.0),), 0.0, 0.0), -1.0)
+        for _, each in edges
+    }
     changes.discard(NOTHING)
     known = starts.of(name)
     if len(changes) != 1 or not known:

@@ -41,10 +41,14 @@ CODES: dict[str, Code] = {
     "steps-over": Code("warning", "A counter that steps over the one value that its guard waits for."),
     "unproven": Code("info", "A recursion of which no proof was found that it ends."),
     "diverging": Code("warning", "A recursion without a bound that makes things larger with every round."),
-    "slow-contraction": Code("info", "A recursion without a bound that makes things hardly smaller with every round."),
+    "slow-contraction": Code(
+        "info", "A recursion without a bound that makes things hardly smaller with every round."
+    ),
     "no-rule": Code("warning", "A Selection of which no rule can apply."),
     "constant-guard": Code("warning", "A guard that is always true or always false."),
-    "singular": Code("warning", "A constant transformation that flattens what it acts on; its subtree is dropped."),
+    "singular": Code(
+        "warning", "A constant transformation that flattens what it acts on; its subtree is dropped."
+    ),
     "unused": Code("warning", "A definition that nothing uses."),
     "unreachable": Code("warning", "A Selection that no object leads to."),
     "random-loop": Code("info", "A recursion that ends with some probability only."),
@@ -57,7 +61,9 @@ CODES: dict[str, Code] = {
     "radians": Code("info", "An angle that looks like radians; angles are degrees."),
     # what the derivation meets, and limits
     "limit": Code("error", "A limit of the bytecode: values at a time, or draws in one application."),
-    "depth-limit": Code("error", "A path of the derivation that enters more symbols than the forecast follows."),
+    "depth-limit": Code(
+        "error", "A path of the derivation that enters more symbols than the forecast follows."
+    ),
     "state-limit": Code("info", "More states than the forecast counts."),
     "expansion": Code("info", "A scene that has too many primitives to be written out for another program."),
     # comments to the compiler

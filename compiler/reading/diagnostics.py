@@ -87,7 +87,13 @@ class Diagnostics:
     items: list[Diagnostic] = field(default_factory=list)
 
     def add(
-        self, code: str, span: Span, message: str, hint: str = "", notes: Iterable[Note] = (), mend: str | None = None
+        self,
+        code: str,
+        span: Span,
+        message: str,
+        hint: str = "",
+        notes: Iterable[Note] = (),
+        mend: str | None = None,
     ) -> None:
         """Add a message; its severity is the code's. A code without a row in CODES is a KeyError."""
         self.items.append(Diagnostic(code, CODES[code].severity, message, span, hint, tuple(notes), mend))
@@ -97,7 +103,9 @@ class Diagnostics:
         return any(item.severity == "error" for item in self.items)
 
     def sorted(self) -> list[Diagnostic]:
-        return sorted(self.items, key=lambda d: (d.span.source.name, d.span.start, SEVERITIES.index(d.severity)))
+        return sorted(
+            self.items, key=lambda d: (d.span.source.name, d.span.start, SEVERITIES.index(d.severity))
+        )
 
 
 def render(diagnostic: Diagnostic) -> str:

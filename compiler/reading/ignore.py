@@ -88,12 +88,16 @@ def check_ignores(source: Source, data: bytes, diagnostics: Diagnostics) -> None
             hint = nearest(each.code, CODES) or "codes stand in brackets in messages, such as unused"
             diagnostics.add("ignore", span, f"no message has the code '{each.code}'", hint)
         elif CODES[each.code].severity == "error":
-            diagnostics.add("ignore", span, f"'{each.code}' is an error: it can't be ignored", "mend it instead")
+            diagnostics.add(
+                "ignore", span, f"'{each.code}' is an error: it can't be ignored", "mend it instead"
+            )
 
 
 def is_ignored(code: str, severity: str, offset: int, found: Iterable[Ignore]) -> bool:
     """Whether one of ``found`` speaks of a message that begins at ``offset``."""
-    return severity != "error" and any(each.code == code and each.start <= offset <= each.end for each in found)
+    return severity != "error" and any(
+        each.code == code and each.start <= offset <= each.end for each in found
+    )
 
 
 def kept(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:

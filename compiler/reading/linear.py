@@ -15,7 +15,9 @@ from .model import Apply, Assign, Calculate, Constant, Expression, Operator, Rea
 
 # What some functions give whatever they are given.
 RANGES = {"rand": (0.0, 1.0), "hash": (0.0, 1.0), "sin": (-1.0, 1.0), "cos": (-1.0, 1.0), "sign": (-1.0, 1.0)}
-COMPARISONS = frozenset(("less", "less_equal", "greater", "greater_equal", "equal", "not_equal", "and", "or", "not"))
+COMPARISONS = frozenset(
+    ("less", "less_equal", "greater", "greater_equal", "equal", "not_equal", "and", "or", "not")
+)
 
 
 class Form(NamedTuple):

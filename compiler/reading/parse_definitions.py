@@ -180,7 +180,9 @@ class DefinitionReader:
                     target.span, f"Selection {target.name} has no rule", mistakes.RULE, "missing"
                 )
         is_whole = body is not None and not any(child.is_error for child in node.children)
-        return syntax.Selection(self.reading.span(node), target, parameters, entry, tuple(productions), is_whole)
+        return syntax.Selection(
+            self.reading.span(node), target, parameters, entry, tuple(productions), is_whole
+        )
 
     def calculation(self, node: Node) -> syntax.Calculation | None:
         target, found = self.statements(node, "--count;")

@@ -396,7 +396,9 @@ class _Body:
             message = "the name of its Selection stands before what a rule produces"
             mend = f"{self.own_name} -> "
             self.reading.complain(start, message, f"write {mend}…;", "missing", mend=mend)
-            rule = syntax.Rule(piece.span, syntax.Name(start, self.own_name), (syntax.Alternative(union.span, None, union),))
+            rule = syntax.Rule(
+                piece.span, syntax.Name(start, self.own_name), (syntax.Alternative(union.span, None, union),)
+            )
             return piece._replace(kind="rule", value=rule)
         if not isinstance(first, syntax.Name | syntax.Call):
             self.reading.complain(union.span, "this is no rule", RULE)

@@ -36,14 +36,43 @@ _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 
 # How numbers are written elsewhere: pattern, message, hint (empty: to write the number that the last column makes of it).
 _MALFORMED: tuple[tuple[re.Pattern[str], str, str, Callable[[re.Match[str]], str] | None], ...] = (
-    (re.compile(r"\.\d+([eE]\d+)?"), r"'\g<0>' lacks a digit before the point", "", lambda match: f"0{match[0]}"),
-    (re.compile(r"(\d+)\.([eE]\d+)?"), r"'\g<0>' lacks a digit after the point", "", lambda match: f"{match[1]}.0{match[2] or ''}"),
-    (re.compile(r"0[xX]([0-9a-fA-F]{1,16})"), r"'\g<0>' isn't written in tens", "", lambda match: str(int(match[1], 16))),
-    (re.compile(r"\d+(_\d+)+(\.\d+)?"), "'_' can't stand in the number \\g<0>", "", lambda match: match[0].replace("_", "")),
-    (re.compile(r"(\d+(?:\.\d+)?)[fFlLdD]"), r"'\g<0>' ends with a letter: all numbers are of one kind", "", lambda match: match[1]),
+    (
+        re.compile(r"\.\d+([eE]\d+)?"),
+        r"'\g<0>' lacks a digit before the point",
+        "",
+        lambda match: f"0{match[0]}",
+    ),
+    (
+        re.compile(r"(\d+)\.([eE]\d+)?"),
+        r"'\g<0>' lacks a digit after the point",
+        "",
+        lambda match: f"{match[1]}.0{match[2] or ''}",
+    ),
+    (
+        re.compile(r"0[xX]([0-9a-fA-F]{1,16})"),
+        r"'\g<0>' isn't written in tens",
+        "",
+        lambda match: str(int(match[1], 16)),
+    ),
+    (
+        re.compile(r"\d+(_\d+)+(\.\d+)?"),
+        "'_' can't stand in the number \\g<0>",
+        "",
+        lambda match: match[0].replace("_", ""),
+    ),
+    (
+        re.compile(r"(\d+(?:\.\d+)?)[fFlLdD]"),
+        r"'\g<0>' ends with a letter: all numbers are of one kind",
+        "",
+        lambda match: match[1],
+    ),
     (re.compile(r"(\d+(?:\.\d+)?)deg"), "an angle has no unit: all are degrees", "", lambda match: match[1]),
-    (re.compile(r"(\d+(?:\.\d+)?)([A-Za-z_]\w*)"), r"the number \1 touches the name \2",
-     r"write \1*\2 for the product, or a space between two values", None),
+    (
+        re.compile(r"(\d+(?:\.\d+)?)([A-Za-z_]\w*)"),
+        r"the number \1 touches the name \2",
+        r"write \1*\2 for the product, or a space between two values",
+        None,
+    ),
     (re.compile(r".*", re.DOTALL), r"'\g<0>' is no number", "a number looks like 2, 0.5 or 1.5e-3", None),
 )
 

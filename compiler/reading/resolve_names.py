@@ -240,7 +240,9 @@ class Names:
         if taken := vocabulary.kind_of(name.name):
             message = f"'{name.name}' is {ARTICLES[taken]}, not {wanted}"
             hint = (
-                "perhaps a ';' is missing before it" if taken == "operation" else self.nearest(name.name, kinds)
+                "perhaps a ';' is missing before it"
+                if taken == "operation"
+                else self.nearest(name.name, kinds)
             )
             return Problem("wrong-kind", name.span, message, hint)
         if name.name in vocabulary.UNSUPPORTED:

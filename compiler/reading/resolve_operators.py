@@ -160,8 +160,9 @@ def _from_povray(node: syntax.Operation) -> str | None:
     match argument:
         case syntax.Vector(components=components) if len(components) == 3:
             parts = [None if _is_zero(each) else each.span.text for each in components]
-        case syntax.Binary(operator="*", left=syntax.Name(name=axis), right=factor) | syntax.Binary(
-            operator="*", left=factor, right=syntax.Name(name=axis)
+        case (
+            syntax.Binary(operator="*", left=syntax.Name(name=axis), right=factor)
+            | syntax.Binary(operator="*", left=factor, right=syntax.Name(name=axis))
         ) if axis in ("x", "y", "z"):
             parts = [factor.span.text if each == axis else None for each in "xyz"]
         case _:

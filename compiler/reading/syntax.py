@@ -245,7 +245,9 @@ class Texture(Node):
     block: Block
 
 
-Definition = Include | Declare | ParameterDeclaration | Selection | Calculation | Transformation | Texture | Block
+Definition = (
+    Include | Declare | ParameterDeclaration | Selection | Calculation | Transformation | Texture | Block
+)
 
 
 @dataclass(frozen=True, slots=True)
