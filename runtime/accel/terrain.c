@@ -42,14 +42,12 @@ bool pl_terrain_candidate(pl_tracer *tracer, const pl_terrain *terrain, uint64_t
                           const double d[3], pl_query *query)
 {
     static const double no_arguments[PL_SHAPE_ARGUMENTS];
-    double cells[PL_TERRAIN_CELLS], numbers[12], mapped_o[3], mapped_d[3];
-    pl_affine step, identity = pl_affine_identity();
+    double cells[PL_TERRAIN_CELLS], mapped_o[3], mapped_d[3];
+    pl_affine matrix;
     pl_transform transform;
     pl_terrain_cells(terrain, pl_terrain_tile_at(terrain, tile)->values, leaf, cells);
-    pl_terrain_matrix(&terrain->form, cells, numbers);
-    for (int i = 0; i < 12; i++) step.m[4 * (i % 3) + i / 3] = numbers[i];
-    step = pl_affine_multiply(&identity, &step);
-    pl_transform_set(&transform, &step);
+    pl_terrain_matrix(&terrain->form, cells, &matrix);
+    pl_transform_set(&transform, &matrix);
     memcpy(mapped_o, o, sizeof mapped_o);
     memcpy(mapped_d, d, sizeof mapped_d);
     pl_map_ray(&transform, mapped_o, mapped_d);

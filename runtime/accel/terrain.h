@@ -6,7 +6,7 @@
  *
  *     tile     a subtree of at most 64 triangles: a table of the distinct values of their parameters, in double
  *     classes  one for all tiles: which value of the table is which triangle's which parameter
- *     cluster  eight triangles that follow one another; a tile has their boxes in 8 bits a plane
+ *     cluster  eight triangles that follow one another; a tile has their boxes and corners in 8 bits a coordinate, to filter
  *     front    a tree of boxes over the tiles, as front.h has it
  *
  * A matrix made from a tile's values has the bits that the derivation gives it: every triangle was compared when the tiles
@@ -15,9 +15,11 @@
  *     terrain_find.c  scene -> terrains, or none      terrain_fill.c  terrain -> tiles      terrain.c  rays -> hits
  *     terrain_kernel.h  the traversal, for an instruction set each
  *
- * Example: 2,097,152 triangles with heights of their own and shared edges take 10.6 bytes each, tree included. */
+ * Example: 2,097,152 triangles with heights of their own and shared edges take 18.8 bytes each, tree included. */
 #ifndef PL_TERRAIN_H
 #define PL_TERRAIN_H
+
+#include <string.h>
 
 #include "front.h"
 
@@ -28,9 +30,7 @@ enum {
     PL_TERRAIN_CLUSTERS = PL_TERRAIN_TILE / PL_TERRAIN_CLUSTER,
     PL_TERRAIN_LEVELS = 40,
     PL_TERRAIN_MOST = 1 << 28, /* triangles */
-    /* Kinds of references in a terrain's tree. */
-    PL_KIND_TILE = 1,
-    PL_KIND_CLUSTER = 2
+    PL_KIND_TILE = 1 /* of references in a terrain's tree */
 };
 
 /* The triangles' transformation: number i of its matrix is cell plus[i] - cell minus[i]. */
@@ -42,10 +42,13 @@ typedef struct pl_terrain_form {
     uint8_t plus[12], minus[12];
 } pl_terrain_form;
 
-/* Boxes in the unit frame: plane q lies at lo + q * step. Rows are those of pl_front_node. */
+/* In the unit frame, in steps: plane q lies at lo + q * step, rows are those of pl_front_node; corner q is the whole number
+ * next to where the corner is. Corners stand by cluster: x, y and z of the matrix's origin, of where it brings (1, 0, 0) and of
+ * where it brings (0, 1, 0), of eight triangles each. */
 typedef struct pl_terrain_tile {
     float lo[3], step[3];
     uint8_t planes[6][PL_TERRAIN_CLUSTERS];
+    uint8_t corners[PL_TERRAIN_CLUSTERS][9][PL_TERRAIN_CLUSTER];
     double values[];
 } pl_terrain_tile;
 
@@ -75,7 +78,6 @@ typedef struct pl_terrain {
     uint32_t values;     /* of a tile */
     size_t stride;       /* bytes of a tile */
     unsigned char *memory;
-    double edge;         /* no triangle's edge is longer */
     pl_front front;      /* its tree's leaves are tiles */
     size_t node_bytes;
 } pl_terrain;
@@ -100,10 +102,20 @@ static inline const pl_terrain_tile *pl_terrain_tile_at(const pl_terrain *terrai
     return (const pl_terrain_tile *)(terrain->memory + tile * terrain->stride);
 }
 
-/* The 12 numbers of a triangle's matrix operation from its cells. */
-static inline void pl_terrain_matrix(const pl_terrain_form *form, const double *cells, double numbers[12])
+/* A triangle's matrix from its cells. It is the identity times what its operation says (expression.c): that changes nothing but
+ * the sign of a zero, so only then it is multiplied. */
+static inline void pl_terrain_matrix(const pl_terrain_form *form, const double *cells, pl_affine *matrix)
 {
-    for (int i = 0; i < 12; i++) numbers[i] = cells[form->plus[i]] - cells[form->minus[i]];
+    uint64_t negative_zero = 0;
+    for (int i = 0; i < 12; i++) {
+        const double x = cells[form->plus[i]] - cells[form->minus[i]];
+        uint64_t bits;
+        memcpy(&bits, &x, sizeof bits);
+        negative_zero |= bits == UINT64_C(1) << 63;
+        matrix->m[4 * (i % 3) + i / 3] = x;
+    }
+    const pl_affine identity = pl_affine_identity();
+    if (negative_zero) *matrix = pl_affine_multiply(&identity, matrix);
 }
 
 /* The cells of a triangle of a tile. */

@@ -7,6 +7,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 
 #include "../random.h"
 #include "terrain.h"
@@ -133,7 +134,7 @@ static bool learn(pl_terrain *terrain, pl_terrain_walk *w, uint64_t samples)
 /* Upper bounds over all triangles, of which reach.h makes one for the terrain. */
 typedef struct bounds {
     pl_box box;
-    double stretch, inverse_stretch, move, lack, edge;
+    double stretch, inverse_stretch, move, lack;
 } bounds;
 
 typedef struct filler {
@@ -168,7 +169,6 @@ static void bound_triangle(bounds *b, const pl_transform *transform)
     b->stretch = fmax(b->stretch, frobenius(m));
     b->inverse_stretch = fmax(b->inverse_stretch, frobenius(transform->to_object.m));
     b->move = fmax(b->move, length3(m[3], m[7], m[11]));
-    b->edge = fmax(b->edge, fmax(length3(m[0], m[4], m[8]), length3(m[1], m[5], m[9])));
     for (int axis = 0; axis < 3; axis++) {
         double at = m[4 * axis + 3], x = m[4 * axis], y = m[4 * axis + 1];
         b->box.lo[axis] = fmin(b->box.lo[axis], at + fmin(0.0, fmin(x, y)));
@@ -183,7 +183,6 @@ static void join_bounds(bounds *a, const bounds *b)
     a->inverse_stretch = fmax(a->inverse_stretch, b->inverse_stretch);
     a->move = fmax(a->move, b->move);
     a->lack = fmax(a->lack, b->lack);
-    a->edge = fmax(a->edge, b->edge);
 }
 
 /* Puts a triangle's values in their places; whoever comes second has to bring the same. */
@@ -278,7 +277,7 @@ static float round_up(double x)
 /* Quantises outward, by what the kernels make of it: lo + q * step. */
 static uint8_t plane_below(float lo, float step, float x)
 {
-    int q = step > 0.0f ? (int)((x - lo) / step) : 0;
+    int q = (int)((x - lo) / step);
     q = q < 0 ? 0 : q > 255 ? 255 : q;
     while (q > 0 && lo + (float)q * step > x) q--;
     return (uint8_t)q;
@@ -286,61 +285,76 @@ static uint8_t plane_below(float lo, float step, float x)
 
 static uint8_t plane_above(float lo, float step, float x)
 {
-    int q = step > 0.0f ? (int)((x - lo) / step) : 0;
+    int q = (int)((x - lo) / step);
     q = q < 0 ? 0 : q > 255 ? 255 : q;
     while (q < 255 && lo + (float)q * step < x) q++;
     return (uint8_t)q;
 }
 
-/* The boxes of a tile's clusters in the unit frame, from its values. */
-static uint32_t cluster_boxes(const pl_terrain *terrain, const pl_terrain_tile *tile, pl_boxed *clusters)
+/* The corners of a triangle in the unit frame. */
+static void find_corners(const pl_terrain *terrain, const double *values, uint32_t leaf, double corners[3][3])
 {
-    const uint32_t count = terrain->tile_row / PL_TERRAIN_CLUSTER;
-    for (uint32_t i = 0; i < count; i++)
-        for (int axis = 0; axis < 3; axis++) {
-            clusters[i].lo[axis] = INFINITY;
-            clusters[i].hi[axis] = -INFINITY;
-        }
-    for (uint32_t leaf = 0; leaf < terrain->tile_leaves; leaf++) {
-        double cells[PL_TERRAIN_CELLS], m[12];
-        pl_boxed *box = &clusters[leaf / PL_TERRAIN_CLUSTER];
-        pl_terrain_cells(terrain, tile->values, leaf, cells);
-        pl_terrain_matrix(&terrain->form, cells, m);
-        for (int axis = 0; axis < 3; axis++) {
-            double at = m[9 + axis], x = m[axis], y = m[3 + axis];
-            double lo = (at + fmin(0.0, fmin(x, y)) - terrain->front.centre[axis]) * terrain->front.scale;
-            double hi = (at + fmax(0.0, fmax(x, y)) - terrain->front.centre[axis]) * terrain->front.scale;
-            box->lo[axis] = fminf(box->lo[axis], round_down(lo));
-            box->hi[axis] = fmaxf(box->hi[axis], round_up(hi));
-        }
+    double cells[PL_TERRAIN_CELLS];
+    pl_affine matrix;
+    pl_terrain_cells(terrain, values, leaf, cells);
+    pl_terrain_matrix(&terrain->form, cells, &matrix);
+    for (int axis = 0; axis < 3; axis++) {
+        const double *row = matrix.m + 4 * axis, at[3] = {row[3], row[3] + row[0], row[3] + row[1]};
+        for (int i = 0; i < 3; i++)
+            corners[i][axis] = (at[i] - terrain->front.centre[axis]) * terrain->front.scale;
     }
-    return count;
 }
 
+static void join_corners(pl_boxed *box, double corners[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        for (int axis = 0; axis < 3; axis++) {
+            box->lo[axis] = fminf(box->lo[axis], round_down(corners[i][axis]));
+            box->hi[axis] = fmaxf(box->hi[axis], round_up(corners[i][axis]));
+        }
+}
+
+static void set_corners(pl_terrain_tile *tile, uint32_t leaf, double corners[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        for (int axis = 0; axis < 3; axis++) {
+            double q = (corners[i][axis] - (double)tile->lo[axis]) / (double)tile->step[axis] + 0.5;
+            tile->corners[leaf / PL_TERRAIN_CLUSTER][3 * i + axis][leaf % PL_TERRAIN_CLUSTER] = (uint8_t)fmin(fmax(q, 0.0), 255.0);
+        }
+}
+
+/* A flat tile is LEAST_STEP high all the same, so that one can divide by it. */
+#define LEAST_STEP 0x1p-30f
+
+/* Boxes and corners of a tile, from its values. */
 static void set_tile(const pl_terrain *terrain, uint64_t index, pl_boxed *box)
 {
+    static const pl_boxed nothing = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0};
     pl_terrain_tile *tile = (pl_terrain_tile *)pl_terrain_tile_at(terrain, index);
     pl_boxed clusters[PL_TERRAIN_CLUSTERS];
-    const uint32_t count = cluster_boxes(terrain, tile, clusters);
+    double corners[PL_TERRAIN_TILE][3][3];
+    const uint32_t count = terrain->tile_row / PL_TERRAIN_CLUSTER;
+    *box = nothing;
+    for (uint32_t i = 0; i < count; i++) clusters[i] = nothing;
+    for (uint32_t leaf = 0; leaf < terrain->tile_leaves; leaf++) {
+        find_corners(terrain, tile->values, leaf, corners[leaf]);
+        join_corners(&clusters[leaf / PL_TERRAIN_CLUSTER], corners[leaf]);
+        join_corners(box, corners[leaf]);
+    }
     box->ref = pl_ref_of(PL_KIND_TILE, (uint32_t)index);
     memset(tile->planes, 0, sizeof tile->planes);
+    memset(tile->corners, 0, sizeof tile->corners);
     for (int axis = 0; axis < 3; axis++) {
-        float lo = INFINITY, hi = -INFINITY;
-        for (uint32_t i = 0; i < count; i++) {
-            lo = fminf(lo, clusters[i].lo[axis]);
-            hi = fmaxf(hi, clusters[i].hi[axis]);
-        }
-        float step = (hi - lo) / 255.0f;
-        while (lo + 255.0f * step < hi) step = nextafterf(step, INFINITY);
-        tile->lo[axis] = lo;
+        const float lo = tile->lo[axis] = box->lo[axis];
+        float step = fmaxf((box->hi[axis] - lo) / 255.0f, LEAST_STEP);
+        while (lo + 255.0f * step < box->hi[axis]) step = nextafterf(step, INFINITY);
         tile->step[axis] = step;
-        box->lo[axis] = lo;
-        box->hi[axis] = hi;
         for (uint32_t i = 0; i < count; i++) {
             tile->planes[axis][i] = plane_below(lo, step, clusters[i].lo[axis]);
             tile->planes[3 + axis][i] = plane_above(lo, step, clusters[i].hi[axis]);
         }
     }
+    for (uint32_t leaf = 0; leaf < terrain->tile_leaves; leaf++) set_corners(tile, leaf, corners[leaf]);
 }
 
 /* pl_reach_through for all triangles at once: it rises with each of its arguments. */
@@ -359,7 +373,6 @@ static bool set_frame(pl_terrain *terrain, const bounds *b)
 {
     pl_state state = {.box = b->box, .reach = reach_of(b)};
     const pl_states states = {.list = &state};
-    terrain->edge = b->edge;
     pl_front_set_frame(&terrain->front, &states, 0);
     return terrain->front.framed && isfinite(state.reach.base) && terrain->front.scale < 1e300;
 }
@@ -382,6 +395,17 @@ static bool build_tree(pl_terrain *terrain, int threads)
     return kept != NULL;
 }
 
+/* Rays jump about in large terrains; where there are large pages, finding a page's place is what they needn't wait for. */
+static void *allocate_tiles(size_t bytes)
+{
+    enum { LARGE_PAGE = 1 << 21, LARGE_PAGES = 8 };
+    if (bytes < (size_t)LARGE_PAGES * LARGE_PAGE) return malloc(bytes);
+    size_t rounded = (bytes + LARGE_PAGE - 1) & ~(size_t)(LARGE_PAGE - 1);
+    void *memory = aligned_alloc(LARGE_PAGE, rounded);
+    if (memory) madvise(memory, rounded, MADV_HUGEPAGE);
+    return memory;
+}
+
 bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit)
 {
     pl_terrain_walk w;
@@ -396,7 +420,7 @@ bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit)
         free(terrain->memory);
         terrain->memory = NULL;
         if (!ok || terrain->tiles > PL_REF_INDEX / PL_TERRAIN_CLUSTERS || terrain->tiles > limit / a_tile ||
-            !(terrain->memory = malloc(terrain->tiles * terrain->stride)))
+            !(terrain->memory = allocate_tiles(terrain->tiles * terrain->stride)))
             ok = false;
         job j = {.terrain = terrain};
         if (ok) fill(scene, &j);

@@ -159,15 +159,12 @@ static bool seek(const pl_terrain *terrain, pl_terrain_walk *w, uint32_t level, 
 /* Reads the cells that the walk's last transformation was computed from; false: it isn't of the form. */
 static bool read_cells(const pl_terrain_form *form, const pl_walk *walk, double *cells)
 {
-    double numbers[12];
-    pl_affine step, identity = pl_affine_identity();
+    pl_affine matrix;
     if (walk->node != form->node) return false;
     for (uint32_t c = 0; c < form->slots; c++) cells[c] = walk->scope.parameters[form->slot[c]];
     for (uint32_t c = form->slots; c < form->cells; c++) cells[c] = form->number[c];
-    pl_terrain_matrix(form, cells, numbers);
-    for (int i = 0; i < 12; i++) step.m[4 * (i % 3) + i / 3] = numbers[i];
-    step = pl_affine_multiply(&identity, &step);
-    return memcmp(&step, &walk->transform->to_parent, sizeof step) == 0;
+    pl_terrain_matrix(form, cells, &matrix);
+    return memcmp(&matrix, &walk->transform->to_parent, sizeof matrix) == 0;
 }
 
 /* A terrain of two levels counts 00, 01, 02, 03, 10, … */

@@ -1,24 +1,19 @@
 /* terrain_kernel.h - the traversal of a terrain's tree, tiles and clusters (terrain.h), compiled once for each instruction set
  * by the kernel_*.c, below kernel.h, whose frames and nodes it uses. TERRAIN_KERNEL is the name of the function.
  *
- * Boxes filter in single precision, triangles in double and eight at a time; what is left, hardly ever more than one a hit,
- * is evaluated normatively. */
+ * All filters in single precision; what is left, hardly ever more than one triangle a hit, is evaluated normatively. */
 #include "terrain.h"
 
 /* Eight numbers at once, lowered to what there is; they don't leave this file. */
 #pragma GCC diagnostic ignored "-Wpsabi"
-typedef double double8 __attribute__((vector_size(64)));
-typedef int64_t long8 __attribute__((vector_size(64)));
+typedef float float8 __attribute__((vector_size(32)));
+typedef int32_t int8 __attribute__((vector_size(32)));
 
 /* Bit i: number i is negative. */
-static inline unsigned eight_signs(long8 x)
+static inline unsigned eight_signs(int8 x)
 {
-#if defined(__AVX512DQ__)
-    return _mm512_movepi64_mask((__m512i)x);
-#elif defined(__AVX2__)
-    __m256d half[2];
-    memcpy(half, &x, sizeof half);
-    return (unsigned)_mm256_movemask_pd(half[0]) | (unsigned)_mm256_movemask_pd(half[1]) << 4;
+#ifdef __AVX2__
+    return (unsigned)_mm256_movemask_ps((__m256)x);
 #else
     unsigned bits = 0;
     for (int i = 0; i < 8; i++) bits |= (unsigned)(x[i] < 0) << i;
@@ -26,81 +21,119 @@ static inline unsigned eight_signs(long8 x)
 #endif
 }
 
-static inline double8 eight(double x)
+static inline float8 eight_bytes(const uint8_t *from)
 {
-    return x - (double8){0};
+    const wide bytes = wide_bytes(from);
+    float8 x;
+    memcpy(&x, &bytes, sizeof x);
+    return x;
 }
 
-/* A ray among the triangles, in the terrain's frame. */
+static inline float8 eight_absolute(float8 x)
+{
+    return (float8)((int8)x & INT32_MAX);
+}
+
+static inline void cross(const float8 a[3], const float8 b[3], float8 out[3])
+{
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static inline float8 dot(const float8 a[3], const float8 b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* How much from·b changes where `from` is moved by no more than the margin along each axis. */
+static inline float8 spread(const float margin[3], const float8 b[3])
+{
+    return margin[0] * eight_absolute(b[0]) + margin[1] * eight_absolute(b[1]) + margin[2] * eight_absolute(b[2]);
+}
+
+/* A ray in a tile's steps, from the point next to the tile's low corner, which it passes at t0. */
 typedef struct sight {
-    double8 cells[PL_TERRAIN_CELLS]; /* of the eight triangles looked at */
-    const pl_terrain *terrain;
-    const double *o, *d;
-    double across, along; /* rounding, as much as it could be, of the side of an edge and of the distance */
+    float o[3], d[3], margin[3], t0;
+    float side, depth; /* rounding of the products below, as much as it could be */
 } sight;
 
-/* Where no normative hit lies farther from its triangle than `slack`, o may be moved by it and the ray then meets the
- * triangle exactly. That changes the products below by slack · |d| · edge and slack · edge²; slack holds their own rounding too. */
-static inline void begin_sight(sight *s, const pl_terrain *terrain, const double o[3], const double d[3])
+/* margin: of each corner, half a step; and of the ray, in steps. Rounding: the sides are sums of three products of numbers up
+ * to size, length and 255, the depths of those up to size, 255 and 255; 2^-20 is sixteen roundings. */
+static inline sight sight_of(const pl_frame *f, float inverse_square, const pl_terrain_tile *tile)
 {
-    const pl_reach *reach = &terrain->front.reach;
-    const pl_terrain_form *form = &terrain->form;
-    double distance = __builtin_fabs(o[0]) + __builtin_fabs(o[1]) + __builtin_fabs(o[2]);
-    double size = __builtin_fabs(d[0]) + __builtin_fabs(d[1]) + __builtin_fabs(d[2]);
-    double slack = DBL_EPSILON * 2.0 * (reach->gain * distance + reach->base) + 0x1p-44 * (distance + reach->size);
-    s->terrain = terrain;
-    s->o = o;
-    s->d = d;
-    s->across = 4.0 * slack * size * terrain->edge;
-    s->along = 4.0 * slack * terrain->edge * terrain->edge;
-    for (uint32_t c = form->slots; c < form->cells; c++) s->cells[c] = eight(form->number[c]);
-}
-
-/* The cells of a cluster's triangles. */
-static inline void load_cells(sight *s, const double *values, uint32_t leaf)
-{
-    const pl_terrain *terrain = s->terrain;
-    const uint16_t *class = terrain->classes + leaf;
-    for (uint32_t c = 0; c < terrain->form.slots; c++, class += terrain->tile_row)
-        s->cells[c] = (double8){values[class[0]], values[class[1]], values[class[2]], values[class[3]],
-                                values[class[4]], values[class[5]], values[class[6]], values[class[7]]};
-}
-
-/* Which of eight triangles can have a root in (t_min, t_max), as bits; *certain: which must. Möller & Trumbore, "Fast, minimum
- * storage ray/triangle intersection" (1997), without the division. NaN rules nothing out. */
-static inline unsigned filter_eight(const sight *s, double t_min, double t_max, unsigned *certain)
-{
-    const pl_terrain_form *form = &s->terrain->form;
-    const double8 *cells = s->cells;
-    const double *d = s->d;
-    double8 x[3], y[3], from[3];
+    sight s = {.t0 = 0.0f};
+    float size = 3.0f * 255.0f, length = 0.0f;
+#pragma GCC unroll 3
+    for (int axis = 0; axis < 3; axis++) s.t0 += (tile->lo[axis] - f->origin[axis]) * f->direction[axis];
+    s.t0 *= inverse_square;
 #pragma GCC unroll 3
     for (int axis = 0; axis < 3; axis++) {
-        x[axis] = cells[form->plus[axis]] - cells[form->minus[axis]];
-        y[axis] = cells[form->plus[3 + axis]] - cells[form->minus[3 + axis]];
-        from[axis] = s->o[axis] - (cells[form->plus[9 + axis]] - cells[form->minus[9 + axis]]);
+        const float steps = 1.0f / tile->step[axis];
+        s.o[axis] = (f->origin[axis] + s.t0 * f->direction[axis] - tile->lo[axis]) * steps;
+        s.d[axis] = f->direction[axis] * steps;
+        s.margin[axis] = 0.51f + 2.0f * f->slack * steps;
+        size += __builtin_fabsf(s.o[axis]);
+        length += __builtin_fabsf(s.d[axis]);
     }
-    const double8 p[3] = {d[1] * y[2] - d[2] * y[1], d[2] * y[0] - d[0] * y[2], d[0] * y[1] - d[1] * y[0]};
-    const double8 q[3] = {from[1] * x[2] - from[2] * x[1], from[2] * x[0] - from[0] * x[2], from[0] * x[1] - from[1] * x[0]};
-    double8 volume = x[0] * p[0] + x[1] * p[1] + x[2] * p[2], u = from[0] * p[0] + from[1] * p[1] + from[2] * p[2];
-    double8 v = d[0] * q[0] + d[1] * q[1] + d[2] * q[2], t = y[0] * q[0] + y[1] * q[1] + y[2] * q[2];
-    const long8 turn = (long8)volume & INT64_MIN;
-    volume = (double8)((long8)volume ^ turn);
-    u = (double8)((long8)u ^ turn);
-    v = (double8)((long8)v ^ turn);
-    t = (double8)((long8)t ^ turn);
-    const double across = s->across, along = s->along;
-    const double8 first = t_min * volume, last = t_max * volume, side = u + v;
-    const long8 out = (u < -across) | (v < -across) | (side > volume + across) | (t + along < first) | (t - along > last);
-    const long8 in = (u > across) & (v > across) & (side < volume - across) & (t - along > first) & (t + along < last);
-    *certain = eight_signs(in);
+    s.side = 0x1p-20f * size * length * 255.0f;
+    s.depth = 0x1p-19f * size * 255.0f * 255.0f;
+    return s;
+}
+
+/* Which of a cluster's triangles can have a root in (0, t_max) of the frame, as bits; *certain: which must, where that is asked
+ * for. Möller & Trumbore, "Fast, minimum storage ray/triangle intersection" (1997), without the division.
+ *
+ * Where the ray meets a triangle normatively, another one beside it by no more than the margin meets the triangle of rounded
+ * corners; the products of three vectors change by the spread. NaN rules nothing out. */
+static inline unsigned filter_eight(const sight *ray, const pl_terrain_tile *tile, uint32_t cluster, float t_max, bool any,
+                                    unsigned *certain)
+{
+    const uint8_t (*corners)[PL_TERRAIN_CLUSTER] = tile->corners[cluster];
+    const sight s = *ray;
+    float8 x[3], y[3], from[3], d[3], across_x[3], across_y[3], normal[3];
+#pragma GCC unroll 3
+    for (int axis = 0; axis < 3; axis++) {
+        const float8 corner = eight_bytes(corners[axis]);
+        x[axis] = eight_bytes(corners[3 + axis]) - corner;
+        y[axis] = eight_bytes(corners[6 + axis]) - corner;
+        from[axis] = s.o[axis] - corner;
+        d[axis] = s.d[axis] - (float8){0};
+    }
+    cross(d, y, across_y);
+    cross(x, d, across_x);
+    cross(x, y, normal);
+    float8 volume = dot(x, across_y), u = dot(from, across_y), v = dot(from, across_x), t = dot(from, normal);
+    const float8 u_slack = spread(s.margin, across_y) + s.side, v_slack = spread(s.margin, across_x) + s.side;
+    const float8 t_slack = spread(s.margin, normal) + s.depth, both_slack = u_slack + v_slack;
+    const int8 turn = (int8)volume & INT32_MIN;
+    volume = (float8)((int8)volume ^ turn);
+    u = (float8)((int8)u ^ turn);
+    v = (float8)((int8)v ^ turn);
+    t = (float8)((int8)t ^ turn) + s.t0 * volume;
+    const int8 out = (u < -u_slack) | (v < -v_slack) | (u + v > volume + both_slack) | (t < -t_slack) |
+                     (t - t_slack > t_max * volume);
+    if (any) {
+        const float last = t_max * (1.0f - 0x1p-18f);
+        const int8 in = (u > u_slack) & (v > v_slack) & (u + v < volume - both_slack) & (t > t_slack) &
+                        (t + t_slack < last * volume);
+        *certain = eight_signs(in);
+    }
     return ~eight_signs(out) & 0xFF;
 }
 
+/* What a ray is traced through, and the ray in its frame. */
+typedef struct target {
+    const pl_terrain *terrain;
+    const pl_frame *frame;
+    const double *o, *d;
+    float inverse_square; /* of the frame's direction */
+} target;
+
 /* Writes the clusters of a tile that the ray meets, the nearest last; returns their number. */
-static inline unsigned meet_tile(const near *n, const pl_terrain_tile *tile, uint32_t index, uint64_t *entries, pl_ref *nearest)
+static inline unsigned meet_tile(const near *n, const pl_terrain_tile *tile, uint64_t *entries, uint32_t *nearest)
 {
-    static const pl_ref lanes[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+    static const pl_ref clusters[PL_FRONT_WIDTH] = {0, 1, 2, 3, 4, 5, 6, 7};
     wide near_t[3], far_t[3];
 #pragma GCC unroll 3
     for (int axis = 0; axis < 3; axis++) {
@@ -113,25 +146,20 @@ static inline unsigned meet_tile(const near *n, const pl_terrain_tile *tile, uin
     }
     wide enter = wide_max(wide_max(near_t[0], near_t[1]), wide_max(near_t[2], wide_set(0.0f)));
     wide leave = wide_min(wide_min(far_t[0], far_t[1]), wide_min(far_t[2], wide_set(n->t_max)));
-    const pl_ref first = pl_ref_of(PL_KIND_CLUSTER, index * PL_TERRAIN_CLUSTERS);
-    unsigned count = wide_order(enter, leave, lanes, entries, nearest);
-    *nearest += first;
-    for (unsigned i = 0; i + 1 < count; i++) entries[i] += first;
-    return count;
+    return wide_order(enter, leave, clusters, entries, nearest);
 }
 
 /* Tests a cluster's triangles; -1: an error, 1: the query is done. */
-static inline int visit_cluster(pl_tracer *tracer, sight *s, uint32_t index, pl_query *query, bool any)
+static inline int visit_cluster(pl_tracer *tracer, const target *at, const sight *s, uint32_t tile, uint32_t cluster, float t_max,
+                                pl_query *query, bool any)
 {
-    const pl_terrain *terrain = s->terrain;
-    const uint64_t tile = index / PL_TERRAIN_CLUSTERS;
-    const uint32_t leaf = index % PL_TERRAIN_CLUSTERS * PL_TERRAIN_CLUSTER;
-    unsigned certain, left;
-    if (leaf >= terrain->tile_leaves) return 0;
-    load_cells(s, pl_terrain_tile_at(terrain, tile)->values, leaf);
-    left = filter_eight(s, query->t_min, query->t_max, &certain);
-    if (leaf + PL_TERRAIN_CLUSTER > terrain->tile_leaves) {
-        left &= (1u << (terrain->tile_leaves - leaf)) - 1;
+    const pl_terrain *terrain = at->terrain;
+    const uint32_t first = cluster * PL_TERRAIN_CLUSTER;
+    unsigned certain = 0, left;
+    if (first >= terrain->tile_leaves) return 0;
+    left = filter_eight(s, pl_terrain_tile_at(terrain, tile), cluster, t_max, any, &certain);
+    if (first + PL_TERRAIN_CLUSTER > terrain->tile_leaves) {
+        left &= (1u << (terrain->tile_leaves - first)) - 1;
         certain &= left;
     }
     tracer->counters.filtered += PL_TERRAIN_CLUSTER;
@@ -141,33 +169,46 @@ static inline int visit_cluster(pl_tracer *tracer, sight *s, uint32_t index, pl_
     }
     for (; left; left &= left - 1) {
         wide_end();
-        if (!pl_terrain_candidate(tracer, terrain, tile, leaf + (uint32_t)__builtin_ctz(left), s->o, s->d, query)) return -1;
+        if (!pl_terrain_candidate(tracer, terrain, tile, first + (uint32_t)__builtin_ctz(left), at->o, at->d, query)) return -1;
         if (query->done) return 1;
     }
     return 0;
 }
 
-static inline bool visit_terrain(pl_tracer *tracer, sight *s, pl_query *query, bool any)
+/* Tests the clusters of a tile, the nearest first; the same answers. */
+static inline int visit_tile(pl_tracer *tracer, const target *at, near *n, uint32_t index, pl_query *query, bool any)
 {
-    const pl_terrain *terrain = s->terrain;
+    const pl_terrain_tile *tile = pl_terrain_tile_at(at->terrain, index);
+    uint64_t entries[PL_TERRAIN_CLUSTERS];
+    uint32_t cluster;
+    unsigned count = meet_tile(n, tile, entries, &cluster);
+    if (count == 0) return 0;
+    const sight s = sight_of(at->frame, at->inverse_square, tile);
+    for (;;) {
+        int done = visit_cluster(tracer, at, &s, index, cluster, n->t_max, query, any);
+        if (done) return done;
+        n->t_max = local_t_max(at->frame, query->t_max);
+        if (--count == 0 || entry_is_beyond(entries[count - 1], n->t_max)) return 0;
+        cluster = (uint32_t)entries[count - 1];
+    }
+}
+
+static inline bool visit_terrain(pl_tracer *tracer, const target *at, pl_query *query, bool any)
+{
     pl_bvh_work *w = tracer->work;
-    const pl_frame *f = &w->frames[0];
     size_t top = 0;
     uint64_t steps = 0, *stack = w->stack;
     int done = 0;
     near n;
-    look(&n, f);
-    n.t_max = local_t_max(f, query->t_max);
-    stack[top++] = entry_of(0.0f, terrain->front.root);
+    look(&n, at->frame);
+    n.t_max = local_t_max(at->frame, query->t_max);
+    stack[top++] = entry_of(0.0f, at->terrain->front.root);
     while (top && !done) {
-        uint64_t at = stack[--top];
-        pl_ref ref = (pl_ref)at;
-        if (entry_is_beyond(at, n.t_max)) continue;
-        while (ref >> PL_REF_SHIFT != PL_KIND_CLUSTER) {
-            const uint32_t index = ref & PL_REF_INDEX;
-            const bool is_tile = ref >> PL_REF_SHIFT == PL_KIND_TILE;
-            unsigned count = is_tile ? meet_tile(&n, pl_terrain_tile_at(terrain, index), index, stack + top, &ref)
-                                     : meet(&n, &terrain->front.nodes[index], stack + top, &ref);
+        const uint64_t entry = stack[--top];
+        pl_ref ref = (pl_ref)entry;
+        if (entry_is_beyond(entry, n.t_max)) continue;
+        while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
+            unsigned count = meet(&n, &at->terrain->front.nodes[ref], stack + top, &ref);
             steps++;
             if (count == 0) goto next;
             top += count - 1;
@@ -176,8 +217,8 @@ static inline bool visit_terrain(pl_tracer *tracer, sight *s, pl_query *query, b
                 stack = w->stack;
             }
         }
-        done = visit_cluster(tracer, s, ref & PL_REF_INDEX, query, any);
-        n.t_max = local_t_max(f, query->t_max);
+        steps++;
+        done = visit_tile(tracer, at, &n, ref & PL_REF_INDEX, query, any);
     next:;
     }
     tracer->counters.box_tests += steps * PL_FRONT_WIDTH;
@@ -200,10 +241,10 @@ bool TERRAIN_KERNEL(pl_tracer *tracer, const pl_terrain *terrain, const double o
     f->t0 = query->t_min;
     f->rate = 1.0;
     if (begin_frame(f, from + query->t_min * along, along, query->t_max, &local_max)) {
-        sight s;
-        begin_sight(&s, terrain, o, d);
-        ok = query->kind == PL_QUERY_ANY ? visit_terrain(tracer, &s, query, true)
-                                         : visit_terrain(tracer, &s, query, false);
+        const float *v = f->direction;
+        const target at = {terrain, f, o, d, 1.0f / (v[0] * v[0] + v[1] * v[1] + v[2] * v[2])};
+        ok = query->kind == PL_QUERY_ANY ? visit_terrain(tracer, &at, query, true)
+                                         : visit_terrain(tracer, &at, query, false);
     }
     wide_end();
     return ok;
