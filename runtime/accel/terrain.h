@@ -42,8 +42,8 @@ typedef struct pl_terrain_form {
     uint8_t plus[12], minus[12];
 } pl_terrain_form;
 
-/* In the unit frame, in steps: plane q lies at lo + q * step, rows are those of pl_front_node; corner q is the whole number
- * next to where the corner is. Corners stand by cluster: x, y and z of the matrix's origin, of where it brings (1, 0, 0) and of
+/* Planes are in the unit frame: q lies at lo + q * step, rows are those of pl_front_node. Corners are in their cluster's box,
+ * which is 255 wide, each the whole number next to it. They stand by cluster: x, y and z of the matrix's origin, of where it brings (1, 0, 0) and of
  * where it brings (0, 1, 0), of eight triangles each. */
 typedef struct pl_terrain_tile {
     float lo[3], step[3];

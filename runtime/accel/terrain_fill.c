@@ -316,11 +316,15 @@ static void join_corners(pl_boxed *box, double corners[3][3])
 
 static void set_corners(pl_terrain_tile *tile, uint32_t leaf, double corners[3][3])
 {
-    for (int i = 0; i < 3; i++)
-        for (int axis = 0; axis < 3; axis++) {
-            double q = (corners[i][axis] - (double)tile->lo[axis]) / (double)tile->step[axis] + 0.5;
-            tile->corners[leaf / PL_TERRAIN_CLUSTER][3 * i + axis][leaf % PL_TERRAIN_CLUSTER] = (uint8_t)fmin(fmax(q, 0.0), 255.0);
+    const uint32_t cluster = leaf / PL_TERRAIN_CLUSTER;
+    for (int axis = 0; axis < 3; axis++) {
+        const double lo = tile->planes[axis][cluster], part = (tile->planes[3 + axis][cluster] - lo) / 255.0;
+        for (int i = 0; i < 3; i++) {
+            double steps = (corners[i][axis] - (double)tile->lo[axis]) / (double)tile->step[axis];
+            double q = part > 0.0 ? (steps - lo) / part + 0.5 : 0.0;
+            tile->corners[cluster][3 * i + axis][leaf % PL_TERRAIN_CLUSTER] = (uint8_t)fmin(fmax(q, 0.0), 255.0);
         }
+    }
 }
 
 /* A flat tile is LEAST_STEP high all the same, so that one can divide by it. */
@@ -399,7 +403,7 @@ static bool build_tree(pl_terrain *terrain, int threads)
 static void *allocate_tiles(size_t bytes)
 {
     enum { LARGE_PAGE = 1 << 21, LARGE_PAGES = 8 };
-    if (bytes < (size_t)LARGE_PAGES * LARGE_PAGE) return malloc(bytes);
+    if (bytes < (size_t)LARGE_PAGES * LARGE_PAGE) return aligned_alloc(64, (bytes + 63) & ~(size_t)63);
     size_t rounded = (bytes + LARGE_PAGE - 1) & ~(size_t)(LARGE_PAGE - 1);
     void *memory = aligned_alloc(LARGE_PAGE, rounded);
     if (memory) madvise(memory, rounded, MADV_HUGEPAGE);

@@ -58,7 +58,7 @@ typedef struct sight {
     float side, depth; /* rounding of the products below, as much as it could be */
 } sight;
 
-/* margin: of each corner, half a step; and of the ray, in steps. Rounding: the sides are sums of three products of numbers up
+/* margin: of the ray. Rounding: the sides are sums of three products of numbers up
  * to size, length and 255, the depths of those up to size, 255 and 255; 2^-20 is sixteen roundings. */
 static inline sight sight_of(const pl_frame *f, float inverse_square, const pl_terrain_tile *tile)
 {
@@ -72,7 +72,7 @@ static inline sight sight_of(const pl_frame *f, float inverse_square, const pl_t
         const float steps = 1.0f / tile->step[axis];
         s.o[axis] = (f->origin[axis] + s.t0 * f->direction[axis] - tile->lo[axis]) * steps;
         s.d[axis] = f->direction[axis] * steps;
-        s.margin[axis] = 0.51f + 2.0f * f->slack * steps;
+        s.margin[axis] = f->slack * steps;
         size += __builtin_fabsf(s.o[axis]);
         length += __builtin_fabsf(s.d[axis]);
     }
@@ -90,14 +90,16 @@ static inline unsigned filter_eight(const sight *ray, const pl_terrain_tile *til
                                     unsigned *certain)
 {
     const uint8_t (*corners)[PL_TERRAIN_CLUSTER] = tile->corners[cluster];
-    const sight s = *ray;
+    sight s = *ray;
     float8 x[3], y[3], from[3], d[3], across_x[3], across_y[3], normal[3];
 #pragma GCC unroll 3
     for (int axis = 0; axis < 3; axis++) {
+        const float lo = tile->planes[axis][cluster], part = ((float)tile->planes[3 + axis][cluster] - lo) * (1.0f / 255.0f);
         const float8 corner = eight_bytes(corners[axis]);
-        x[axis] = eight_bytes(corners[3 + axis]) - corner;
-        y[axis] = eight_bytes(corners[6 + axis]) - corner;
-        from[axis] = s.o[axis] - corner;
+        x[axis] = (eight_bytes(corners[3 + axis]) - corner) * part;
+        y[axis] = (eight_bytes(corners[6 + axis]) - corner) * part;
+        from[axis] = (s.o[axis] - lo) - corner * part;
+        s.margin[axis] += 0.51f * part + 0x1p-10f;
         d[axis] = s.d[axis] - (float8){0};
     }
     cross(d, y, across_y);
@@ -181,6 +183,8 @@ static inline int visit_tile(pl_tracer *tracer, const target *at, near *n, uint3
     const pl_terrain_tile *tile = pl_terrain_tile_at(at->terrain, index);
     uint64_t entries[PL_TERRAIN_CLUSTERS];
     uint32_t cluster;
+    /* Much of it will be looked at one after another: better wait once. */
+    for (size_t line = 0; line < at->terrain->stride; line += 64) __builtin_prefetch((const char *)tile + line);
     unsigned count = meet_tile(n, tile, entries, &cluster);
     if (count == 0) return 0;
     const sight s = sight_of(at->frame, at->inverse_square, tile);
