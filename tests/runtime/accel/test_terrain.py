@@ -112,7 +112,7 @@ def test_what_few_tiles_do_not_show_is_learnt_from_more():
     origins, directions = rays(data, 3000)
     with Scene(data) as scene, Scene(data, front_items=21) as fronts:
         ours, theirs = scene.intersect(origins, directions), fronts.intersect(origins, directions)
-        assert scene.statistics["bytes"]["items"] < 16 * 2 * 4**7
+        assert scene.statistics["bytes"]["items"] < 22 * 2 * 4**7
     assert_same(ours._asdict(), theirs._asdict(), "flat")
 
 
@@ -122,8 +122,8 @@ def test_a_triangle_costs_a_few_bytes_and_is_counted():
         statistics = scene.statistics
     assert statistics["primitives"] == 2 * 4**8 and statistics["depth"] == 10
     assert statistics["terrain"]["tiles"] == 2 * 4**5
-    assert statistics["bytes"]["items"] + statistics["bytes"]["nodes"] < 14 * statistics["primitives"]
-    assert statistics["scene_bytes"] < 14 * statistics["primitives"] + 20_000
+    assert statistics["bytes"]["items"] + statistics["bytes"]["nodes"] < 20 * statistics["primitives"]
+    assert statistics["scene_bytes"] < 20 * statistics["primitives"] + 20_000
 
 
 def test_memory_that_is_not_enough_for_tiles():
