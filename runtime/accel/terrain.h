@@ -43,8 +43,8 @@ typedef struct pl_terrain_form {
 } pl_terrain_form;
 
 /* Planes are in the unit frame: q lies at lo + q * step, rows are those of pl_front_node. Corners are in their cluster's box,
- * which is 255 wide, each the whole number next to it. They stand by cluster: x, y and z of the matrix's origin, of where it brings (1, 0, 0) and of
- * where it brings (0, 1, 0), of eight triangles each. */
+ * which is 255 wide, each the whole number next to it. They stand by cluster: x, y and z of where the matrix brings the
+ * origin, (1, 0, 0) and (0, 1, 0), of eight triangles each. */
 typedef struct pl_terrain_tile {
     float lo[3], step[3];
     uint8_t planes[6][PL_TERRAIN_CLUSTERS];
