@@ -27,8 +27,9 @@ _LENGTH = re.compile(rb"content-length:\s*(\d+)\s*$", re.IGNORECASE)
 MAX_MESSAGE_BYTES = 1 << 30
 
 # Edits leave no garbage in cycles (facts.drop_facts), and searching a large file for it takes a tenth of a second. So it is
-# looked for after so many new objects only, and in each pause all that there is by then is taken out of the search.
+# looked for after so many new objects only, and what there is by then, in each pause or after fewer, is taken out of the search.
 GARBAGE_THRESHOLDS = 200_000, 10, 1_000
+MANY_OBJECTS = 50_000
 
 # Whole-file checks begin when nothing was typed for so long: their snapshot costs some milliseconds.
 PAUSE_S = 0.1
@@ -91,6 +92,8 @@ class Dispatcher:
             self._handle(self.inbox.popleft())
         elif self.session.has_work:
             self.session.work()
+            if gc.get_count()[0] > MANY_OBJECTS and gc.isenabled():
+                gc.freeze()  # what the checks found, mostly
             if self._has_opened and not self.session.has_work:
                 # A large file is many objects that stay; searching them for garbage takes longer than a key may.
                 gc.freeze()

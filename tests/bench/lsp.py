@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Callable, Iterable
+from typing import Callable, Iterable, Iterator
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
@@ -291,19 +291,23 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
     arguments = parser.parse_args()
     tables = []
-    if arguments.scene:
-        tables.append((arguments.scene.name, measured(Bench(arguments.scene.read_text()), arguments.edits)))
-    else:
-        text = generated_scene(arguments.lines)
-        tables.append((f"{text.count(chr(10)):,} lines", measured(Bench(text), arguments.edits)))
-        with tempfile.TemporaryDirectory() as folder:
-            tables.append(("the same in ten files", measured(in_files(text, Path(folder)), arguments.edits)))
-        tables.append(("real scenes", real_scenes(max(20, arguments.edits // 10))))
+    for what, bench in tables_of(arguments):
+        tables.append({"what": what, "rows": rows(bench)})
+        if not arguments.json:
+            report(what, bench)
     if arguments.json:
-        print(json.dumps([{"what": what, "rows": rows(bench)} for what, bench in tables]))
+        print(json.dumps(tables))
+
+
+def tables_of(arguments: argparse.Namespace) -> Iterator[tuple[str, Bench]]:
+    if arguments.scene:
+        yield arguments.scene.name, measured(Bench(arguments.scene.read_text()), arguments.edits)
         return
-    for what, bench in tables:
-        report(what, bench)
+    text = generated_scene(arguments.lines)
+    yield f"{text.count(chr(10)):,} lines", measured(Bench(text), arguments.edits)
+    with tempfile.TemporaryDirectory() as folder:
+        yield "the same in ten files", measured(in_files(text, Path(folder)), arguments.edits)
+    yield "real scenes", real_scenes(max(20, arguments.edits // 10))
 
 
 def measured(bench: Bench, edits: int) -> Bench:
@@ -355,7 +359,7 @@ def report(what: str, bench: Bench) -> None:
         budget = f"{row['budget_ms']:,}" if row["budget_ms"] else ""
         print(f"{row['what']:42}{row['count']:6}{row['p50_ms']:9.2f}{row['p99_ms']:9.2f}{row['max_ms']:9.2f}{budget:>9}"
               f"{row['processor_p50_ms']:9.2f}{row['processor_p99_ms']:9.2f}{row['processor_max_ms']:9.2f}")
-    print()
+    print(flush=True)
 
 
 if __name__ == "__main__":
