@@ -108,7 +108,8 @@ def _write_png(path: Path, pixels: memoryview | np.ndarray, width: int, height: 
         add({"ImageDescription": "Description"}.get(name, name), value)
     picture = Image.frombuffer("RGB", (width, height), memoryview(pixels).cast("B"), "raw", "RGB", 0, 1)
     with written_whole(path) as temporary:
-        picture.save(temporary, "PNG", pnginfo=texts, compress_level=PNG_COMPRESSION)
+        # Without a format's name: asked for one, Pillow imports all that it has.
+        picture.save(temporary, pnginfo=texts, compress_level=PNG_COMPRESSION)
 
 
 def check_format(path: str | Path) -> None:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from . import habits, mistakes, syntax
+from . import mistakes, syntax
 from .diagnostics import Diagnostics
 from .grammar import syntax_tree
 from .ignore import check_ignores
@@ -43,7 +43,10 @@ def convert(source: Source, text: bytes, tree: Tree, diagnostics: Diagnostics) -
     reader = _FileReader(source, text, diagnostics)
     reader.file(tree)
     mistakes.extras(reader.reading, tree)
-    habits.sharpen(source, text, diagnostics)
+    if diagnostics.items:
+        from . import habits  # many patterns, for texts with mistakes only
+
+        habits.sharpen(source, text, diagnostics)
     check_ignores(source, text, diagnostics)
     diagnostics.items[:] = diagnostics.sorted()
     return syntax.File(Span(source, 0, len(source.data)), tuple(reader.definitions))
