@@ -29,7 +29,7 @@ enum {
     PL_TERRAIN_CLUSTER = 8,
     PL_TERRAIN_CLUSTERS = PL_TERRAIN_TILE / PL_TERRAIN_CLUSTER,
     PL_TERRAIN_LEVELS = 40,
-    PL_TERRAIN_MOST = 1 << 28, /* triangles */
+    PL_TERRAIN_MOST = 1 << 24, /* triangles: more take too long before the first ray */
     PL_KIND_TILE = 1 /* of references in a terrain's tree */
 };
 
