@@ -43,7 +43,7 @@ def threads(bench: Bench) -> None:
         case = Case(name, scene, parameters, bench.folder)
         points = []
         for count in range(1, cores + 1):
-            answers = [ours(case, pinned=False, threads=count) for _ in range(bench.rounds)]
+            answers = [ours(case, pinned=False, threads=count, wall=True) for _ in range(bench.rounds)]
             points.append(
                 {
                     "threads": count,

@@ -95,7 +95,7 @@ class Results:
             for name, points in self.curves.items():
                 for label, style, xs, ys in lines_of(name, points) if name.startswith(kind) else ():
                     axis.plot(xs, ys, style, label=label)
-                for point in points if name.startswith("fronts") else ():
+                for point in points if kind == "fronts" and name.startswith(kind) else ():
                     items = "all" if point["items"] > 1e9 else point["items"]
                     axis.annotate(items, (point["bytes"] * 1e-6, point["coherent"]), (0, 5), textcoords="offset points", fontsize=7)
             axis.set(title=title, xlabel=x, ylabel=y)
