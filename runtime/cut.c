@@ -3,9 +3,6 @@
 
 #include "random.h"
 
-/* An endless state is cut where its box is smaller than so many times what rounding can move a ray by. */
-#define BLUR 16.0
-
 /* How much wider boxes are where they end what stands below: for its own slack, and for roundings of composed maps. */
 #define ROOM_SLACK 4.0
 #define ROOM_SIZE 0x1p-30
@@ -32,7 +29,7 @@ static pl_span span_with_room(const pl_state *s, const double o[3], const double
 pl_span pl_span_in(const pl_states *states, uint32_t state, const double o[3], const double d[3], pl_span within)
 {
     const pl_state *s = &states->list[state];
-    return s->unbounded ? within : span_with_room(s, o, d, pl_reach_slack(&s->gate, o), within);
+    return span_with_room(s, o, d, pl_reach_slack(&s->gate, o), within);
 }
 
 pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], const double d[3], double stretch,
@@ -40,15 +37,17 @@ pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], c
                    pl_span *inside)
 {
     const pl_state *s = &states->list[state];
-    *inside = within;
-    if (s->unbounded) return PL_GATE_OPEN;
-    if (pl_box_is_empty(&s->box)) return PL_GATE_MISSED;
     double slack = pl_reach_slack(&s->gate, o);
+    if (s->unbounded) {
+        *inside = span_with_room(s, o, d, slack, within);
+        return PL_GATE_OPEN;
+    }
+    if (pl_box_is_empty(&s->box)) return PL_GATE_MISSED;
     pl_span own = clip(&s->box, o, d, slack, within);
     *t_entry = own.enter;
     if (!(own.enter <= own.leave && own.enter <= t_max)) return PL_GATE_MISSED;
     bool small = s->diameter * stretch <= footprint->width + footprint->spread * own.enter;
-    if (!small && !(s->endless && s->diameter <= BLUR * slack)) {
+    if (!small && !(s->endless && s->diameter <= PL_CUT_BLUR * slack)) {
         *inside = span_with_room(s, o, d, slack, within);
         return PL_GATE_OPEN;
     }
@@ -58,7 +57,7 @@ pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], c
 
 uint64_t pl_cut_hash(uint64_t hash, const uint32_t *terms, uint32_t count)
 {
-    for (uint32_t i = 0; i < count; i++) hash = pl_mix(hash, terms[i]);
+    for (uint32_t i = 0; i < count; i++) hash = hash * PL_CUT_BASE + pl_mix(PL_CUT_BASE, terms[i]);
     return hash;
 }
 
@@ -69,8 +68,7 @@ uint64_t pl_cut_ray(const double origin[3], const double direction[3])
     return key;
 }
 
-bool pl_cut_is_drawn(const pl_states *states, uint32_t state, const double d[3], uint64_t hash, uint32_t depth,
-                     uint64_t ray)
+double pl_cut_chance(uint64_t hash, uint32_t depth, uint64_t ray)
 {
-    return pl_unit(pl_mix(pl_mix(hash, depth), ray)) < pl_coverage_of(states, state, d);
+    return pl_unit(pl_mix(pl_mix(hash, depth), ray));
 }

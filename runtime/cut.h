@@ -31,8 +31,8 @@
 
 #include "state.h"
 
-/* Directions, up to sign, that coverages are kept for: axes, diagonals of faces, diagonals of the box. */
-enum { PL_COVERAGE_DIRECTIONS = 13 };
+/* An endless state is cut where its box is no larger than so many times what rounding can move a ray by. */
+#define PL_CUT_BLUR 16.0
 
 /* PX footprints, in scene units, at t are width + spread · t; entries at t <= skip lie within the ray's first footprint. */
 typedef struct pl_footprint {
@@ -46,30 +46,28 @@ typedef struct pl_span {
 
 typedef enum pl_gate { PL_GATE_MISSED, PL_GATE_OPEN, PL_GATE_CUT } pl_gate;
 
-/* stretch: the product of the stretches on the path. within: the span above, at first from the ray's t_min to INFINITY.
+/* stretch: the product of the stretches on the path. within: the span above, at first that of the whole scene's box
+ * (pl_span_in of state 0) within the ray's t_min and INFINITY.
  * t_max only saves work. Where the gate is open, *inside is the span for what stands below. */
 pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], const double d[3], double stretch,
                    const pl_footprint *footprint, pl_span within, double t_min, double t_max, double *t_entry,
                    pl_span *inside);
 
-/* The span below an instance, whatever its gate: that of the instance's box with room, within the one above. */
+/* The span below an instance, whatever its gate: that of the instance's box with room, within the one above. What is unbounded has
+ * the box of what isn't: spans are for gates, and what has no bounds has none. */
 pl_span pl_span_in(const pl_states *states, uint32_t state, const double o[3], const double d[3], pl_span within);
 
-/* The path's hash so far and more terms of it; 0 at the root. */
+/* A hash of a path's terms: a polynomial in PL_CUT_BASE modulo 2^64, so that those of two stretches of a path can be joined:
+ * hash · PL_CUT_BASE^(terms of the second) + hash of the second. pl_cut_hash goes on from a hash with more terms; it is 0 at
+ * the root. */
+#define PL_CUT_BASE UINT64_C(0x9E3779B97F4A7C15)
 uint64_t pl_cut_hash(uint64_t hash, const uint32_t *terms, uint32_t count);
 
 /* A ray's key: a pure function of its origin and direction in the world. */
 uint64_t pl_cut_ray(const double origin[3], const double direction[3]);
 
-/* Whether the cut instance is drawn for a ray, with direction d in its frame: a pure function of path and ray. hash: of the
- * path's terms; depth: symbols entered on it, the state's own included; ray: pl_cut_ray. */
-bool pl_cut_is_drawn(const pl_states *states, uint32_t state, const double d[3], uint64_t hash, uint32_t depth,
-                     uint64_t ray);
-
-/* Finds the coverages of all states; sets states->coverage. */
-bool pl_coverage_build(pl_states *states, pl_error *error);
-
-/* The share of a state's silhouette that is covered from a direction of its frame. */
-double pl_coverage_of(const pl_states *states, uint32_t state, const double d[3]);
+/* In [0, 1), a pure function of path and ray: a cut instance is drawn if its state covers more than that. hash: of the path's
+ * terms; depth: symbols entered on it, the state's own included; ray: pl_cut_ray. */
+double pl_cut_chance(uint64_t hash, uint32_t depth, uint64_t ray);
 
 #endif

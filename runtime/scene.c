@@ -7,9 +7,10 @@
 #include <unistd.h>
 
 #include "accel/front.h"
+#include "accel/gated.h"
 #include "accel/lazy.h"
 #include "accel/terrain.h"
-#include "cut.h"
+#include "coverage.h"
 #include "error.h"
 #include "table.h"
 
@@ -190,7 +191,7 @@ static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
     /* A voxel's state is entered without the gates above it, which count where there are cut-offs. */
     if (states->cuts && scene->accel == &pl_accel_grid) scene->accel = &pl_accel_boxes;
     if (states->cuts && scene->accel == &pl_accel_bvh) scene->accel = &pl_accel_gated;
-    return !states->cuts || pl_coverage_build(states, error);
+    return !states->cuts || (states->coverage = pl_coverage_create(states, error)) != NULL;
 }
 
 static bool build(pl_scene *scene, pl_error *error)
@@ -217,6 +218,7 @@ static bool build(pl_scene *scene, pl_error *error)
     counts->bytes_meshes = scene->mesh_bytes;
     counts->bytes_states = scene->states.bytes;
     if (scene->accel == &pl_accel_bvh) pl_fronts_count(scene, counts);
+    if (scene->accel == &pl_accel_gated) pl_gated_count(scene, counts);
     if (scene->accel == &pl_accel_terrain) pl_terrains_count(scene, counts);
     counts->scene_bytes = counts->bytes_program + counts->bytes_meshes + counts->bytes_states + counts->bytes_nodes +
                           counts->bytes_items;

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "coverage.h"
 #include "error.h"
 #include "random.h"
 
@@ -111,7 +112,7 @@ void pl_states_free(pl_states *states)
     free(states->list);
     free(states->table);
     free(states->node_boxes);
-    free(states->coverage);
+    pl_coverage_free(states->coverage);
     memset(states, 0, sizeof *states);
 }
 

@@ -73,7 +73,7 @@ typedef struct pl_states {
     uint32_t table_size;
     pl_node_box *node_boxes; /* per graph node; NULL unless asked for */
     bool cuts;               /* a detail cut-off applies: every instance is passed through its gate (cut.h) */
-    float *coverage;         /* of each state by direction, with cuts (coverage.c) */
+    struct pl_coverage *coverage; /* with cuts (coverage.h) */
     struct pl_block *blocks; /* memory of items, transformations, terms and keys */
     size_t bytes, limit;
     uint32_t most;

@@ -267,7 +267,7 @@ bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, p
     if (!accel->items) return walk_surface(tracer, ray, hit, &hit->path, surface, error);
     if (!accel->items(tracer->scene, &hit->trail, &tracer->items)) return pl_fail_memory(error, "shading a hit");
     int64_t textured = innermost_texture(&tracer->items, &code);
-    if (!code) {
+    if (!code && !hit->cut_depth) {
         items_surface(tracer, ray, hit, &tracer->items, textured, surface);
         return true;
     }

@@ -82,7 +82,7 @@ uint64_t pl_trace_primitive(pl_tracer *tracer, const pl_hit *hit)
 {
     const pl_scene *scene = tracer->scene;
     uint64_t primitive = 0;
-    if (scene->accel->node_boxes || scene->states.cuts)
+    if (scene->accel->node_boxes || (scene->states.cuts && !scene->accel->items))
         return pl_states_locate(&scene->states, &hit->path, hit->cut_depth);
     if (!scene->accel->items) return hit->primitive;
     if (!scene->accel->items(scene, &hit->trail, &tracer->items)) return UINT64_MAX;

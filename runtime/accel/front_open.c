@@ -354,8 +354,8 @@ static uint32_t live_items(const pl_states *states, const pl_state *state)
     return count;
 }
 
-/* Opens as long as at most `most` items result; the rest stays on the heap. A state with one item costs nothing, unless
- * there is no end of them. */
+/* Opens as long as at most `most` items result; the rest stays on the heap. A state with one item costs nothing, but
+ * there may be no end of them. most = 0: nothing is opened. */
 static bool open_all(opening *o, uint32_t state, uint64_t most)
 {
     const pl_states *states = o->compositions->states;
@@ -370,7 +370,7 @@ static bool open_all(opening *o, uint32_t state, uint64_t most)
         closed c = pop(o);
         uint64_t adds = live_items(states, &states->list[c.item->what]);
         uint64_t now = o->counts.primitives + o->heap_count + kept;
-        if (now + adds <= most || (adds <= 1 && !states->list[c.item->what].endless)) {
+        if (now + adds <= most || (adds <= 1 && most > 0 && !states->list[c.item->what].endless)) {
             ok = open_state(o, &c, c.item->what);
         } else {
             ok = grow(&rest, kept, &rest_capacity, sizeof *rest);

@@ -1,251 +1,287 @@
-/* gated.c - bvh where there are cut-offs: the cyclic graph itself, a tree a state, every instance passed through its gate
- * (cut.h). A stack of instances, each with the ray in its own frame.
- *
- * A frame is an instance of a state on the way from the root; an entry of the stack is a node or item of a frame that
- * is still to be visited. Entries are visited depth first, near ones first, so the frames in use form a stack as well:
- * when an entry is taken, all frames above its own are done. Both stacks grow on the heap and drop nothing. */
+/* gated.c - what the kernels of gated.h leave to double precision: gates that may be cut, primitives, and paths. */
 #include "gated.h"
 
 #include <stdlib.h>
 #include <string.h>
 
+#include "../coverage.h"
 #include "../error.h"
 
-typedef struct frame {
-    const pl_state *state;
-    const pl_gated_tree *tree;
-    const pl_item *item; /* of the parent frame's state; NULL at the root */
-    uint32_t parent, depth;
-    uint64_t first; /* primitives before this instance */
-    double o[3], d[3];
-    double stretch; /* with cut-offs: the product of stretches, and the hash of the path (cut.h) */
-    uint64_t hash;
-    pl_span inside;
-    pl_slab slab;
-} frame;
+/* --- working memory --- */
 
-typedef struct pending {
-    double t_entry;
-    uint32_t frame;
-    int32_t reference;
-} pending;
-
-typedef struct work {
-    frame *frames;
-    pending *stack;
-    size_t frame_count, frame_capacity, stack_count, stack_capacity;
-} work;
-
-static void *work_create(const pl_scene *scene, pl_error *error)
+static bool grow(void *array, size_t least, size_t *capacity, size_t element, pl_error *error)
 {
-    (void)scene;
-    work *w = calloc(1, sizeof *w);
-    if (!w) pl_fail_memory(error, "preparing to trace");
-    return w;
+    void **place = array, *data;
+    if (least <= *capacity) return true;
+    size_t more = 2 * least + 16;
+    if (!(data = realloc(*place, more * element))) return pl_fail_memory(error, "tracing a ray");
+    *place = data;
+    *capacity = more;
+    return true;
+}
+
+bool pl_gated_grow_frames(pl_gated_work *w, size_t count, pl_error *error)
+{
+    return grow(&w->frames, count + 1, &w->frame_capacity, sizeof *w->frames, error);
+}
+
+bool pl_gated_grow_stack(pl_gated_work *w, size_t top, pl_error *error)
+{
+    return grow(&w->stack, top + 64, &w->stack_capacity, sizeof *w->stack, error);
 }
 
 static void work_destroy(void *memory)
 {
-    work *w = memory;
+    pl_gated_work *w = memory;
     if (!w) return;
     free(w->frames);
     free(w->stack);
+    free(w->chain);
     free(w);
 }
 
-static bool push(work *w, pending entry, pl_error *error)
+static void *work_create(const pl_scene *scene, pl_error *error)
 {
-    if (w->stack_count == w->stack_capacity) {
-        size_t capacity = w->stack_capacity ? 2 * w->stack_capacity : 64;
-        pending *stack = realloc(w->stack, capacity * sizeof *stack);
-        if (!stack) return pl_fail_memory(error, "tracing a ray");
-        w->stack = stack;
-        w->stack_capacity = capacity;
+    (void)scene;
+    pl_gated_work *w = calloc(1, sizeof *w);
+    if (!w) pl_fail_memory(error, "preparing to trace");
+    else if (pl_gated_grow_frames(w, 0, error) && pl_gated_grow_stack(w, 0, error)) return w;
+    work_destroy(w);
+    return NULL;
+}
+
+/* --- down the path --- */
+
+/* The items of the opened nodes of a front from below its own state down to one, in w->chain, and one more; their number,
+ * or 0: no memory. */
+static size_t list_items(pl_gated_work *w, const pl_front *front, uint32_t opened, const pl_item *item, pl_error *error)
+{
+    size_t count = 1;
+    for (uint32_t at = opened; at; at = front->opened[at].parent) count++;
+    if (!grow(&w->chain, count, &w->chain_capacity, sizeof *w->chain, error)) return 0;
+    w->chain[count - 1] = item;
+    for (size_t i = count - 1; i > 0; opened = front->opened[opened].parent) w->chain[--i] = front->opened[opened].item;
+    return count;
+}
+
+static const pl_item *instance_item(const pl_scene *scene, const pl_front *front, uint32_t instance)
+{
+    const pl_front_instance *it = &front->instances[instance];
+    return pl_front_item(&scene->states, front, it->opened, it->item);
+}
+
+/* Maps a ray from a front's state to an item of an opened node, one transformation after another. */
+static bool map_down(pl_gated_work *w, const pl_front *front, uint32_t opened, const pl_item *item, double o[3],
+                     double d[3], pl_error *error)
+{
+    const size_t count = list_items(w, front, opened, item, error);
+    for (size_t i = 0; i < count; i++)
+        for (uint32_t k = 0; k < w->chain[i]->transform_count; k++) pl_map_ray(w->chain[i]->transforms[k], o, d);
+    return count > 0;
+}
+
+/* The normative ray of a frame, from the deepest frame above that has one. */
+static bool map_frame(const pl_scene *scene, pl_gated_work *w, uint32_t index, pl_error *error)
+{
+    uint32_t from = index;
+    while (!w->frames[from].at.mapped) from--;
+    for (; from < index; from++) {
+        const pl_frame *parent = &w->frames[from].at;
+        pl_frame *f = &w->frames[from + 1].at;
+        memcpy(f->normative_o, parent->normative_o, sizeof f->normative_o);
+        memcpy(f->normative_d, parent->normative_d, sizeof f->normative_d);
+        if (!map_down(w, parent->front, parent->front->instances[f->instance].opened,
+                      instance_item(scene, parent->front, f->instance), f->normative_o, f->normative_d, error))
+            return false;
+        f->mapped = true;
     }
-    w->stack[w->stack_count++] = entry;
     return true;
 }
 
-/* The frame at the end of the stack, uninitialised. Moves the others, so pointers to frames don't survive. */
-static frame *push_frame(work *w, pl_error *error)
+/* The same with all that gates need. Where a box lies within the one around it, that one's span takes nothing away. */
+static bool place_down(const pl_scene *scene, pl_gated_work *w, const pl_front *front, uint32_t opened,
+                       const pl_item *item, pl_gated_place *place, pl_error *error)
 {
-    if (w->frame_count == w->frame_capacity) {
-        size_t capacity = w->frame_capacity ? 2 * w->frame_capacity : 32;
-        frame *frames = realloc(w->frames, capacity * sizeof *frames);
-        if (!frames) {
-            pl_fail_memory(error, "tracing a ray");
-            return NULL;
+    const pl_gated *gated = scene->structure;
+    const pl_states *states = &scene->states;
+    const size_t count = list_items(w, front, opened, item, error);
+    uint32_t state = front->state;
+    for (size_t i = 0; i < count; i++) {
+        const pl_item *at = w->chain[i];
+        if (!gated->states[state].nested[at - states->list[state].items])
+            place->within = pl_span_in(states, state, place->o, place->d, place->within);
+        for (uint32_t k = 0; k < at->transform_count; k++) {
+            pl_map_ray(at->transforms[k], place->o, place->d);
+            place->stretch *= at->transforms[k]->stretch;
         }
-        w->frames = frames;
-        w->frame_capacity = capacity;
+        state = at->what;
     }
-    return &w->frames[w->frame_count++];
+    return count > 0;
 }
 
-/* Pushes what a frame begins with: its tree's root and, on top, what has no bounds. */
-static bool begin_frame(const pl_scene *scene, work *w, uint32_t index, uint32_t state, double t_entry, pl_query *query)
+static bool place_frame(const pl_scene *scene, pl_gated_work *w, uint32_t index, pl_error *error)
 {
-    frame *f = &w->frames[index];
-    f->state = &scene->states.list[state];
-    f->tree = (const pl_gated_tree *)scene->structure + state;
-    f->slab = pl_slab_of(f->o, f->d, pl_reach_slack(&f->state->reach, f->o));
-    if (f->tree->root != PL_GATED_NOTHING && !push(w, (pending){t_entry, index, f->tree->root}, query->error))
-        return false;
-    for (uint32_t i = f->tree->unbounded_count; i-- > 0;)
-        if (!push(w, (pending){query->t_min, index, ~f->tree->unbounded[i]}, query->error)) return false;
+    uint32_t from = index;
+    while (!w->frames[from].placed) from--;
+    for (; from < index; from++) {
+        const pl_front *front = w->frames[from].at.front;
+        pl_gated_frame *f = &w->frames[from + 1];
+        const uint32_t instance = f->at.instance;
+        f->place = w->frames[from].place;
+        if (!place_down(scene, w, front, front->instances[instance].opened, instance_item(scene, front, instance),
+                        &f->place, error))
+            return false;
+        f->placed = true;
+    }
     return true;
 }
 
-/* Tests a node's children and pushes those that the ray meets, the nearest last. */
-static bool visit_node(work *w, const frame *f, uint32_t index, const pl_gated_node *node, pl_query *query,
-                       pl_counters *counters)
-{
-    const pl_slab *slab = &f->slab;
-    double entry[PL_GATED_WIDTH], leave[PL_GATED_WIDTH];
-    for (int i = 0; i < PL_GATED_WIDTH; i++) entry[i] = query->t_min, leave[i] = query->t_max;
-    for (int axis = 0; axis < 3; axis++) {
-        const double *near_plane = node->planes[slab->negative[axis]][axis];
-        const double *far_plane = node->planes[!slab->negative[axis]][axis];
-        double near_origin = slab->near_origin[axis], far_origin = slab->far_origin[axis], by = slab->inverse[axis];
-        for (int i = 0; i < PL_GATED_WIDTH; i++) {
-            double t_near = (near_plane[i] - near_origin) * by, t_far = (far_plane[i] - far_origin) * by;
-            entry[i] = t_near > entry[i] ? t_near : entry[i];
-            leave[i] = t_far < leave[i] ? t_far : leave[i];
-        }
-    }
-    pending met[PL_GATED_WIDTH];
-    int count = 0;
-    for (int i = 0; i < PL_GATED_WIDTH && node->child[i] != PL_GATED_NOTHING; i++) {
-        counters->box_tests++;
-        if (!(entry[i] <= leave[i])) {
-            if (f->depth > counters->miss_depth) counters->miss_depth = f->depth;
-            continue;
-        }
-        int place = count++;
-        for (; place > 0 && met[place - 1].t_entry < entry[i]; place--) met[place] = met[place - 1];
-        met[place] = (pending){entry[i], index, node->child[i]};
-    }
-    for (int i = 0; i < count; i++)
-        if (!push(w, met[i], query->error)) return false;
-    return true;
-}
+/* --- offering --- */
 
-/* A position on the stack of frames, and the item at its end. */
+/* A leaf's place: frames 1 … frame, then a primitive or an instance. */
 typedef struct source {
-    const work *work;
+    const pl_scene *scene;
+    const pl_gated_work *work;
     uint32_t frame;
-    const pl_item *item;
+    pl_ref ref;
 } source;
 
-/* The union terms from the root: the items' terms of the chain of frames, written from the end. */
-static bool write_path(const void *context, pl_path *path)
+/* Pairs of a rung and an instance in it, then a rung and a reference. */
+static bool write_trail(const void *context, pl_path *trail)
 {
     const source *s = context;
-    uint32_t length = s->item->term_count, index = s->frame;
-    for (; s->work->frames[index].item; index = s->work->frames[index].parent)
-        length += s->work->frames[index].item->term_count;
-    path->length = 0;
-    if (length > path->capacity) {
-        uint32_t *terms = realloc(path->terms, length * sizeof *terms);
-        if (!terms) return false;
-        path->terms = terms;
-        path->capacity = length;
+    const pl_gated *gated = s->scene->structure;
+    uint32_t length = 0;
+    for (uint32_t i = 0; i <= s->frame; i++) {
+        const pl_gated_frame *f = &s->work->frames[i];
+        pl_ref ref = i == s->frame ? s->ref : f[1].at.instance;
+        if (!pl_path_push(trail, length++, (uint32_t)(f->rung - gated->rungs)) || !pl_path_push(trail, length++, ref))
+            return false;
     }
-    path->length = length;
-    const pl_item *item = s->item;
-    for (index = s->frame; item; index = s->work->frames[index].parent) {
-        length -= item->term_count;
-        memcpy(path->terms + length, item->terms, item->term_count * sizeof *item->terms);
-        item = s->work->frames[index].item;
+    trail->length = length;
+    return true;
+}
+
+bool pl_gated_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query)
+{
+    pl_gated_work *w = tracer->work;
+    const pl_scene *scene = tracer->scene;
+    const pl_gated_frame *f = &w->frames[frame];
+    const pl_front *front = f->at.front;
+    const pl_front_primitive *primitive = &front->primitives[ref & PL_REF_INDEX];
+    const pl_item *item = pl_front_item(&scene->states, front, primitive->opened, primitive->item);
+    if (!f->at.mapped && !map_frame(scene, w, frame, query->error)) return false;
+    double o[3], d[3];
+    memcpy(o, f->at.normative_o, sizeof o);
+    memcpy(d, f->at.normative_d, sizeof d);
+    if (!map_down(w, front, primitive->opened, item, o, d, query->error)) return false;
+    source s = {scene, w, frame, ref};
+    pl_leaf leaf = {
+        .shape = item->what,
+        .arguments = item->arguments,
+        .mesh = item->kind == PL_NODE_MESH ? scene->meshes[item->what] : NULL,
+        .trail = write_trail,
+        .source = &s,
+        .o = o,
+        .d = d,
+    };
+    tracer->counters.primitive_tests++;
+    return pl_query_leaf(query, &leaf);
+}
+
+int pl_gated_arrive(pl_tracer *tracer, uint32_t frame, uint32_t instance, bool cut, pl_query *query)
+{
+    pl_gated_work *w = tracer->work;
+    const pl_scene *scene = tracer->scene;
+    const pl_states *states = &scene->states;
+    const pl_gated_frame *f = &w->frames[frame];
+    const pl_front *front = f->at.front;
+    const pl_item *item = instance_item(scene, front, instance);
+    const uint64_t hash = w->frames[frame + 1].hash;
+    const uint32_t depth = w->frames[frame + 1].depth;
+    tracer->counters.box_tests++;
+    if (cut) { /* most of what isn't drawn needn't be mapped */
+        const double most = pl_coverage_most(states, item->what);
+        if (most < 0.0) return pl_fail_memory(query->error, "measuring coverages"), -1;
+        if (!(pl_cut_chance(hash, depth, query->ray) < most)) return 0;
+    }
+    if (!f->placed && !place_frame(scene, w, frame, query->error)) return -1;
+    pl_gated_place place = f->place;
+    if (!place_down(scene, w, front, front->instances[instance].opened, item, &place, query->error)) return -1;
+    pl_arrival arrival = {item->what, place.o, place.d, place.stretch, place.within, depth};
+    double t_entry;
+    switch (pl_query_gate(query, states, &arrival, &t_entry, &place.within)) {
+    case PL_GATE_MISSED: return 0;
+    case PL_GATE_OPEN:
+        w->frames[frame + 1].place = place;
+        w->frames[frame + 1].placed = true;
+        return 1;
+    case PL_GATE_CUT: break;
+    }
+    source s = {scene, w, frame, pl_ref_of(PL_KIND_INSTANCE, instance)};
+    pl_leaf leaf = {.trail = write_trail, .source = &s};
+    return pl_query_cut(query, states, &arrival, hash, t_entry, &leaf) ? 0 : -1;
+}
+
+/* --- from a trail to the items on the path --- */
+
+static bool add_items(pl_items *items, const pl_front *front, uint32_t opened, const pl_item *last)
+{
+    size_t begin = items->count, count = 1;
+    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent]) count++;
+    if (begin + count > items->capacity) {
+        size_t capacity = 2 * (begin + count) + 16;
+        const pl_item **list = realloc(items->list, capacity * sizeof *list);
+        if (!list) return false;
+        items->list = list;
+        items->capacity = capacity;
+    }
+    items->count = begin + count;
+    items->list[begin + --count] = last;
+    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent])
+        items->list[begin + --count] = at->item;
+    return true;
+}
+
+static bool trail_items(const pl_scene *scene, const pl_path *trail, pl_items *items)
+{
+    const pl_gated *gated = scene->structure;
+    items->count = 0;
+    for (uint32_t i = 0; i < trail->length; i += 2) {
+        const pl_front *front = &gated->rungs[trail->terms[i]].front;
+        const pl_ref ref = trail->terms[i + 1];
+        const bool last = i + 2 == trail->length;
+        uint32_t opened, item;
+        if (!last || ref >> PL_REF_SHIFT == PL_KIND_INSTANCE) {
+            opened = front->instances[ref & PL_REF_INDEX].opened;
+            item = front->instances[ref & PL_REF_INDEX].item;
+        } else {
+            opened = front->primitives[ref & PL_REF_INDEX].opened;
+            item = front->primitives[ref & PL_REF_INDEX].item;
+        }
+        if (!add_items(items, front, opened, pl_front_item(&scene->states, front, opened, item))) return false;
     }
     return true;
 }
 
-/* An item of a frame: a leaf is tested, a state becomes a frame. */
-static bool visit_item(pl_tracer *tracer, const pending *at, const pl_item *item, pl_query *query)
-{
-    work *w = tracer->work;
-    const pl_scene *scene = tracer->scene;
-    if (query->shadow && item->no_shadow) return true;
-    const frame *parent = &w->frames[at->frame];
-    uint64_t first = pl_add_saturating(parent->first, item->first);
-    uint32_t depth = parent->depth + 1;
-    double o[3], d[3], stretch = parent->stretch;
-    memcpy(o, parent->o, sizeof o);
-    memcpy(d, parent->d, sizeof d);
-    for (uint32_t i = 0; i < item->transform_count; i++) {
-        pl_map_ray(item->transforms[i], o, d);
-        stretch *= item->transforms[i]->stretch;
-    }
-    if (item->kind != PL_NODE_ENTER) {
-        source s = {w, at->frame, item};
-        pl_leaf leaf = {.arguments = item->arguments, .primitive = first, .path = write_path, .source = &s};
-        if (item->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[item->what];
-        else leaf.shape = item->what;
-        tracer->counters.primitive_tests++;
-        leaf.o = o;
-        leaf.d = d;
-        return pl_query_leaf(query, &leaf);
-    }
-    uint64_t hash = 0;
-    pl_span inside = parent->inside;
-    if (scene->states.cuts) {
-        pl_arrival arrival = {item->what, o, d, stretch, parent->inside, depth};
-        double t_entry;
-        pl_gate gate = pl_query_gate(query, &scene->states, &arrival, &t_entry, &inside);
-        if (gate == PL_GATE_MISSED) return true;
-        hash = pl_cut_hash(parent->hash, item->terms, item->term_count);
-        if (gate == PL_GATE_CUT) {
-            source s = {w, at->frame, item};
-            pl_leaf leaf = {.path = write_path, .source = &s};
-            return pl_query_cut(query, &scene->states, &arrival, hash, t_entry, &leaf);
-        }
-    }
-    uint32_t index = (uint32_t)w->frame_count;
-    frame *f = push_frame(w, query->error);
-    if (!f) return false;
-    f->item = item;
-    f->parent = at->frame;
-    f->depth = depth;
-    f->first = first;
-    f->stretch = stretch;
-    f->hash = hash;
-    f->inside = inside;
-    memcpy(f->o, o, sizeof o);
-    memcpy(f->d, d, sizeof d);
-    return begin_frame(scene, w, index, item->what, at->t_entry, query);
-}
+/* --- which kernel --- */
 
 static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
 {
-    work *w = tracer->work;
-    w->frame_count = w->stack_count = 0;
-    frame *root = push_frame(w, query->error);
-    if (!root) return false;
-    memset(root, 0, sizeof *root);
-    root->stretch = 1.0;
-    root->inside = (pl_span){query->t_min, INFINITY};
-    memcpy(root->o, ray->origin, sizeof root->o);
-    memcpy(root->d, ray->direction, sizeof root->d);
-    if (!begin_frame(tracer->scene, w, 0, 0, query->t_min, query)) return false;
-    for (uint64_t steps = 0; w->stack_count && !query->done; steps++) {
-        if (steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
-        pending at = w->stack[--w->stack_count];
-        if (at.t_entry > query->t_max) continue;
-        w->frame_count = at.frame + 1;
-        const frame *f = &w->frames[at.frame];
-        bool ok = at.reference >= 0
-                      ? visit_node(w, f, at.frame, &f->tree->nodes[at.reference], query, &tracer->counters)
-                      : visit_item(tracer, &at, &f->state->items[~at.reference], query);
-        if (!ok) return false;
+    switch (tracer->scene->isa) {
+#ifdef __x86_64__
+    case PL_ISA_AVX512: return pl_gated_trace_avx512(tracer, ray, query);
+    case PL_ISA_AVX2: return pl_gated_trace_avx2(tracer, ray, query);
+#endif
+    default: return pl_gated_trace_scalar(tracer, ray, query);
     }
-    return true;
 }
 
 const pl_accel pl_accel_gated = {.name = "bvh",
-                               .states = true,
-                               .build = pl_gated_build,
-                               .destroy = pl_gated_destroy,
-                               .work_create = work_create,
-                               .work_destroy = work_destroy,
-                               .trace = trace};
+                                 .states = true,
+                                 .build = pl_gated_build,
+                                 .destroy = pl_gated_destroy,
+                                 .work_create = work_create,
+                                 .work_destroy = work_destroy,
+                                 .trace = trace,
+                                 .items = trail_items};

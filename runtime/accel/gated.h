@@ -1,28 +1,97 @@
-/* gated.h - a 4-wide tree of boxes a state, over the state's items in the state's own frame.
+/* gated.h - bvh where there are cut-offs: fronts whose gates are all open are walked through as ever, others are avoided.
  *
- * gated_build.c fills it, gated.c traverses it. References (`child`, `root`): >= 0 a node of the same tree, PL_GATED_NOTHING,
- * else ~item. */
+ * Every state that rays can come to has *rungs*: fronts of K, K/4, K/16 … items and, at last, of its items alone
+ * (K = 1). A front has walked through the gates (cut.h) of the states that stand opened in it, so it may be entered only
+ * where they are open: where the smallest of them, `least`, is larger than any footprint on the ray's way through the
+ * state's box. The kernel takes the largest rung of which this holds; the last one has no gates inside and may always be
+ * entered. So what is far above the cut-off costs what it costs without one, a comparison aside.
+ *
+ * An instance has a gate of its own. The kernel goes in where it is clearly open; elsewhere pl_gated_arrive decides in
+ * double, from the ray mapped down the path. What rungs there are never shows in a hit.
+ *
+ *     gated_build.c  the rungs, K, budget      gated_kernel.h  traversal      gated.c  what is decided in double */
 #ifndef PL_GATED_H
 #define PL_GATED_H
 
-#include "accel.h"
+#include "../cut.h"
+#include "bvh.h"
 
-enum { PL_GATED_WIDTH = 4, PL_GATED_NOTHING = INT32_MIN };
+/* From a front's state to one of its instances: the product of stretches, the hash of the terms (cut.h) with
+ * PL_CUT_BASE to their number, and symbols entered. */
+typedef struct pl_gated_link {
+    double stretch;
+    uint64_t hash, power;
+    uint32_t depth;
+} pl_gated_link;
 
-typedef struct pl_gated_node {
-    double planes[2][3][PL_GATED_WIDTH]; /* lo and hi; unused children have empty boxes */
-    int32_t child[PL_GATED_WIDTH];
-} pl_gated_node;
+typedef struct pl_gated_rung {
+    pl_front front;        /* .front of its instances: a state */
+    const pl_gated_link *links; /* of each instance */
+    double least;          /* the smallest gate inside: diameter times stretch; INFINITY: none */
+    float farthest;        /* from a distance of the ray's origin on (bvh.h) a gate inside may be cut for being a blur */
+} pl_gated_rung;
 
-typedef struct pl_gated_tree {
-    const pl_gated_node *nodes;
-    const int32_t *unbounded; /* items without bounds: always visited */
-    uint32_t node_count, unbounded_count;
-    int32_t root;
-} pl_gated_tree;
+typedef struct pl_gated_state {
+    uint32_t first, count; /* rungs, the largest first */
+    double diameter;
+    double least;          /* of the first rung, and no more than the diameter */
+    float farthest;        /* of its own gate, like a rung's … */
+    float farthest_inside; /* … and of the first rung */
+    bool unbounded;
+    const uint8_t *nested; /* of each item: what it enters has its box within this state's (gated_build.c) */
+} pl_gated_state;
 
-/* One tree a state of scene->states, in memory of the states'. */
+typedef struct pl_gated {
+    pl_gated_state *states;
+    pl_gated_rung *rungs;
+    uint32_t count, capacity; /* of rungs */
+    uint8_t *nested;
+    pl_fronts sums; /* counts and bytes of the rungs */
+    size_t bytes;
+} pl_gated;
+
+/* A ray in the frame of a state, mapped down the path, and what gates need to know of the path. */
+typedef struct pl_gated_place {
+    double o[3], d[3], stretch;
+    pl_span within; /* of the instances above, and of this one as far as it is needed */
+} pl_gated_place;
+
+typedef struct pl_gated_frame {
+    pl_frame at;
+    const pl_gated_rung *rung;
+    double stretch; /* nearly the normative product */
+    double to;      /* no gate below is entered later */
+    uint64_t hash;  /* of the path to here */
+    uint32_t depth; /* symbols entered on it */
+    bool placed;
+    pl_gated_place place;
+} pl_gated_frame;
+
+typedef struct pl_gated_work {
+    pl_gated_frame *frames;
+    uint64_t *stack;
+    const pl_item **chain;
+    size_t frame_capacity, stack_capacity, chain_capacity;
+} pl_gated_work;
+
+typedef bool pl_gated_kernel(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
+extern pl_gated_kernel pl_gated_trace_scalar, pl_gated_trace_avx2, pl_gated_trace_avx512;
+
+/* Evaluates a primitive of a frame normatively and offers it. false: an error. */
+bool pl_gated_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query);
+
+/* Decides at the gate of an instance, whose frame + 1 has its hash; where it is cut, offers its box. cut: if it isn't missed,
+ * it is cut. 1: open, and frame + 1 is placed; 0: not; -1: an error. */
+int pl_gated_arrive(pl_tracer *tracer, uint32_t frame, uint32_t instance, bool cut, pl_query *query);
+
+/* Room for one more frame, for eight more entries above `top`; false: no memory. */
+bool pl_gated_grow_frames(pl_gated_work *work, size_t count, pl_error *error);
+bool pl_gated_grow_stack(pl_gated_work *work, size_t top, pl_error *error);
+
 bool pl_gated_build(pl_scene *scene, pl_error *error);
 void pl_gated_destroy(pl_scene *scene);
+
+/* What was built, for the statistics. */
+void pl_gated_count(const pl_scene *scene, pl_statistics *counts);
 
 #endif

@@ -1,4 +1,8 @@
-/* gated_build.c - builds the trees of gated.h: binned surface area heuristic, top down, collapsed to 4 children a node. */
+/* gated_build.c - which rungs there are, under the budget, and what their gates ask for (gated.h).
+ *
+ * The last rungs, of K = 1, are those of all states that items lead to. Larger ones cost memory, so they are made only of the
+ * states that the largest fronts lead to, from the scene's own on: where a ray has come to a state between those, it
+ * goes on by single items until it meets the next of them. */
 #include "gated.h"
 
 #include <stdlib.h>
@@ -6,191 +10,281 @@
 
 #include "../error.h"
 
-enum { BINS = 16, DEEP = 48 };
+enum { LARGEST_ITEMS = 1024, LEAST_ITEMS = 4, RATIO = 4, DEFAULT_BYTES = 280 << 10 };
 
-typedef struct entry {
-    pl_box box;
-    int32_t item;
-} entry;
+/* A front's share of nodes an item, and of the smaller rungs that come with it. */
+#define NODE_BYTES_AN_ITEM (sizeof(pl_front_node) / 5.0)
+#define RUNGS_OF_LARGEST (1.0 / (1.0 - 1.0 / RATIO))
 
 typedef struct building {
-    entry *entries;
-    pl_gated_node *nodes;
-    uint32_t node_count;
+    pl_scene *scene;
+    pl_gated *gated;
+    pl_compositions *compositions;
+    pl_error *error;
 } building;
 
-typedef struct group {
-    uint32_t first, count;
-    double area;
-} group;
+/* --- boxes within boxes --- */
 
-static double centre(const entry *e, int axis)
+/* How far out of a box another may stand that still lies within it, of its diameter: less than the room of spans. */
+#define NEARLY 0x1p-32
+
+static bool is_within(const pl_box *inner, const pl_state *outer)
 {
-    return e->box.lo[axis] + e->box.hi[axis];
+    const double tolerance = NEARLY * outer->diameter;
+    for (int axis = 0; axis < 3; axis++)
+        if (!(inner->lo[axis] >= outer->box.lo[axis] - tolerance && inner->hi[axis] <= outer->box.hi[axis] + tolerance))
+            return false;
+    return true;
 }
 
-static group group_of(const building *b, uint32_t first, uint32_t count)
+/* Whether what an item enters has its box within its state's: also as widened by the slacks of both (reach.h), so that the
+ * span of the outer one, which has room for four times its slack, never ends within the inner one. */
+static bool is_nested(const pl_states *states, const pl_state *state, const pl_item *item)
 {
-    pl_box box = pl_box_empty();
-    for (uint32_t i = 0; i < count; i++) pl_box_join(&box, &b->entries[first + i].box);
-    return (group){first, count, pl_box_area(&box)};
-}
-
-static int bin_of(double at, double lo, double scale)
-{
-    int bin = (int)((at - lo) * scale);
-    return bin < 0 ? 0 : bin >= BINS ? BINS - 1 : bin;
-}
-
-/* The cheapest of the BINS - 1 planes of an axis: how many bins stand left of it; *cost is INFINITY if none divides. */
-static int best_plane(const building *b, const group *g, int axis, double lo, double scale, double *cost)
-{
-    pl_box boxes[BINS], left = pl_box_empty(), right = pl_box_empty();
-    uint32_t counts[BINS] = {0}, before = 0;
-    double right_area[BINS];
-    int best = 0;
-    for (int i = 0; i < BINS; i++) boxes[i] = pl_box_empty();
-    for (uint32_t i = 0; i < g->count; i++) {
-        const entry *e = &b->entries[g->first + i];
-        int bin = bin_of(centre(e, axis), lo, scale);
-        counts[bin]++;
-        pl_box_join(&boxes[bin], &e->box);
+    if (item->kind != PL_NODE_ENTER) return true;
+    const pl_state *below = &states->list[item->what];
+    pl_affine to_parent = pl_affine_identity(), to_object = pl_affine_identity();
+    for (uint32_t i = 0; i < item->transform_count; i++) {
+        to_parent = pl_affine_multiply(&to_parent, &item->transforms[i]->to_parent);
+        to_object = pl_affine_multiply(&item->transforms[i]->to_object, &to_object);
     }
-    for (int i = BINS - 1; i > 0; i--) {
-        pl_box_join(&right, &boxes[i]);
-        right_area[i] = pl_box_area(&right);
+    pl_box box = pl_box_map(&to_parent, &below->box);
+    if (!is_within(&box, state)) return false;
+    const double m = pl_largest_stretch(&to_parent), n = pl_largest_stretch(&to_object);
+    const double *move = to_object.m;
+    const double offset = sqrt(move[3] * move[3] + move[7] * move[7] + move[11] * move[11]);
+    const pl_reach *inner = &below->gate, *outer = &state->gate;
+    return m * n * inner->gain <= 3.0 * outer->gain && m * (inner->gain * offset + inner->base) <= 3.0 * outer->base;
+}
+
+static bool find_nested(building *b)
+{
+    const pl_states *states = &b->scene->states;
+    size_t total = 0;
+    for (uint32_t i = 0; i < states->count; i++) total += states->list[i].item_count;
+    uint8_t *nested = b->gated->nested = malloc(total + 1);
+    if (!nested) return pl_fail_memory(b->error, "building the rungs");
+    b->gated->bytes += total + 1;
+    for (uint32_t i = 0; i < states->count; i++) {
+        const pl_state *state = &states->list[i];
+        b->gated->states[i].nested = nested;
+        for (uint32_t k = 0; k < state->item_count; k++) *nested++ = is_nested(states, state, &state->items[k]);
     }
-    *cost = INFINITY;
-    for (int i = 1; i < BINS; i++) {
-        pl_box_join(&left, &boxes[i - 1]);
-        before += counts[i - 1];
-        double here = pl_box_area(&left) * before + right_area[i] * (g->count - before);
-        if (before > 0 && before < g->count && here < *cost) {
-            *cost = here;
-            best = i;
+    return true;
+}
+
+/* --- gates --- */
+
+/* The |ray origin| in a state's frame, mapped on by to_object, up to which an endless state isn't cut for being a blur. */
+static double farthest_of(const pl_state *state, const pl_affine *to_object)
+{
+    if (!state->endless) return INFINITY;
+    const double *m = to_object->m;
+    const double offset = sqrt(m[3] * m[3] + m[7] * m[7] + m[11] * m[11]);
+    const double most = state->diameter / (PL_CUT_BLUR * DBL_EPSILON) - state->gate.base - state->gate.gain * offset;
+    return 0.99 * most / (state->gate.gain * pl_largest_stretch(to_object));
+}
+
+/* A distance from the origin of a front's state, as one from the centre of its unit frame. */
+static float in_unit_frame(const pl_front *front, double distance)
+{
+    double centre = 0.0;
+    for (int axis = 0; axis < 3; axis++) centre += fabs(front->centre[axis]);
+    const double unit = (distance - centre) * front->scale * (1.0 - 0x1p-20);
+    return unit > 0.0 ? unit < FLT_MAX ? (float)unit : INFINITY : 0.0f;
+}
+
+static void extend(pl_gated_link *link, const pl_item *item)
+{
+    for (uint32_t i = 0; i < item->transform_count; i++) link->stretch *= item->transforms[i]->stretch;
+    for (uint32_t i = 0; i < item->term_count; i++) link->power *= PL_CUT_BASE;
+    link->hash = pl_cut_hash(link->hash, item->terms, item->term_count);
+    link->depth++;
+}
+
+/* Of a front's opened nodes. */
+typedef struct way {
+    pl_gated_link link;
+    pl_affine to_object;
+} way;
+
+/* What the gates inside a rung ask for, and the links of its instances. */
+static bool set_gates(building *b, pl_gated_rung *rung, uint32_t opened_count)
+{
+    const pl_states *states = &b->scene->states;
+    const pl_front *front = &rung->front;
+    way *ways = malloc(opened_count * sizeof *ways);
+    pl_gated_link *links = malloc((front->instance_count + 1) * sizeof *links);
+    bool ok = ways && links;
+    double farthest = INFINITY;
+    rung->links = links;
+    b->gated->bytes += (front->instance_count + 1) * sizeof *links;
+    rung->least = INFINITY;
+    for (uint32_t i = 0; ok && i < opened_count; i++) {
+        const pl_opened *at = &front->opened[i];
+        ways[i] = at->item ? ways[at->parent] : (way){{1.0, 0, 1, 0}, pl_affine_identity()};
+        if (!at->item) continue;
+        const pl_state *state = &states->list[at->item->what];
+        extend(&ways[i].link, at->item);
+        for (uint32_t k = 0; k < at->item->transform_count; k++)
+            ways[i].to_object = pl_affine_multiply(&at->item->transforms[k]->to_object, &ways[i].to_object);
+        if (state->unbounded) continue;
+        rung->least = fmin(rung->least, state->diameter * ways[i].link.stretch);
+        farthest = fmin(farthest, farthest_of(state, &ways[i].to_object));
+    }
+    rung->farthest = in_unit_frame(front, farthest);
+    for (uint32_t i = 0; ok && i < front->instance_count; i++) {
+        const pl_front_instance *it = &front->instances[i];
+        links[i] = ways[it->opened].link;
+        extend(&links[i], pl_front_item(states, front, it->opened, it->item));
+    }
+    free(ways);
+    return ok || pl_fail_memory(b->error, "building the rungs");
+}
+
+/* --- rungs --- */
+
+static bool add_rung(building *b, uint32_t state, uint64_t most)
+{
+    pl_gated *gated = b->gated;
+    if (gated->count == gated->capacity) {
+        uint32_t capacity = gated->capacity ? 2 * gated->capacity : 16;
+        pl_gated_rung *rungs = realloc(gated->rungs, capacity * sizeof *rungs);
+        if (!rungs) return pl_fail_memory(b->error, "building the rungs");
+        gated->rungs = rungs;
+        gated->capacity = capacity;
+    }
+    pl_gated_rung *rung = &gated->rungs[gated->count++];
+    const uint64_t before = gated->sums.opened;
+    rung->links = NULL;
+    return pl_front_make(b->scene, b->compositions, state, most, &gated->sums, &rung->front, b->error) &&
+           set_gates(b, rung, (uint32_t)(gated->sums.opened - before));
+}
+
+/* The rungs of a state, the largest first. Those that hold no more than the next are left out. */
+static bool add_rungs(building *b, uint32_t index, uint64_t most)
+{
+    pl_gated_state *state = &b->gated->states[index];
+    const pl_state *it = &b->scene->states.list[index];
+    const pl_affine identity = pl_affine_identity();
+    state->first = b->gated->count;
+    state->diameter = it->diameter;
+    state->unbounded = it->unbounded;
+    for (; most >= LEAST_ITEMS && most > it->item_count; most /= RATIO)
+        if (!add_rung(b, index, most)) return false;
+    if (!add_rung(b, index, 0)) return false;
+    state->count = b->gated->count - state->first;
+    const pl_gated_rung *first = &b->gated->rungs[state->first];
+    state->farthest = in_unit_frame(&first->front, farthest_of(it, &identity));
+    state->least = state->unbounded ? first->least : fmin(first->least, state->diameter);
+    state->farthest_inside = fminf(first->farthest, state->farthest);
+    return true;
+}
+
+/* --- the budget --- */
+
+/* Marks in `large` the states that fronts of `most` items lead to, from the scene's on; *bytes: what all rungs of those
+ * will take, roughly. */
+static bool follow(const building *b, uint64_t most, bool *large, double *bytes)
+{
+    pl_state_list reached = {0};
+    size_t done = 0;
+    uint32_t state = 0;
+    bool ok = true;
+    memset(large, 0, b->scene->states.count * sizeof *large);
+    *bytes = 0.0;
+    for (; ok; state = reached.list[done++]) {
+        if (!large[state]) {
+            pl_front_counts counts;
+            large[state] = true;
+            ok = pl_front_count(b->compositions, state, most, &counts, &reached, b->error);
+            *bytes += sizeof(pl_gated_rung) + (double)counts.primitives * sizeof(pl_front_primitive) +
+                      (double)counts.instances * (sizeof(pl_front_instance) + sizeof(pl_gated_link)) +
+                      (double)counts.opened * sizeof(pl_opened) +
+                      (double)(counts.primitives + counts.instances) * NODE_BYTES_AN_ITEM;
         }
+        if (done == reached.count) break;
     }
-    return best;
+    free(reached.list);
+    *bytes *= RUNGS_OF_LARGEST;
+    return ok;
 }
 
-/* Reorders a group's entries and returns how many stand in its left part: the cheapest plane, or half of them where
- * no plane divides or the tree has become deep. */
-static uint32_t divide(building *b, const group *g, int level)
+/* What the last rungs take. */
+static double least_bytes(const pl_states *states)
 {
-    double lo[3], hi[3], best_cost = INFINITY;
-    int best_axis = 0, best = 0;
-    for (int axis = 0; axis < 3; axis++) {
-        lo[axis] = INFINITY, hi[axis] = -INFINITY;
-        for (uint32_t i = 0; i < g->count; i++) {
-            double at = centre(&b->entries[g->first + i], axis);
-            if (at < lo[axis]) lo[axis] = at;
-            if (at > hi[axis]) hi[axis] = at;
-        }
-        double cost, width = hi[axis] - lo[axis], scale = BINS / width;
-        if (!isfinite(scale) || !isfinite(width)) continue;
-        int plane = best_plane(b, g, axis, lo[axis], scale, &cost);
-        if (cost < best_cost) {
-            best_cost = cost;
-            best_axis = axis;
-            best = plane;
-        }
-    }
-    if (level > DEEP || best_cost == INFINITY) return g->count / 2;
-    double scale = BINS / (hi[best_axis] - lo[best_axis]);
-    uint32_t left = 0;
-    for (uint32_t i = 0; i < g->count; i++) {
-        entry *e = &b->entries[g->first + i], *place = &b->entries[g->first + left], swap = *e;
-        if (bin_of(centre(e, best_axis), lo[best_axis], scale) >= best) continue;
-        *e = *place;
-        *place = swap;
-        left++;
-    }
-    return left;
+    double bytes = states->count * (double)(sizeof(pl_gated_state) + sizeof(pl_gated_rung) + sizeof(pl_front_node));
+    for (uint32_t i = 0; i < states->count; i++)
+        bytes += states->list[i].item_count * (sizeof(pl_front_instance) + sizeof(pl_gated_link) + NODE_BYTES_AN_ITEM);
+    return bytes;
 }
 
-/* Recursion is bounded: after DEEP levels groups are halved. */
-static int32_t build_group(building *b, uint32_t first, uint32_t count, int level)
+/* The largest K whose rungs fit, and the states that have them. */
+static bool plan(building *b, bool *large, uint64_t *most)
 {
-    if (count == 1) return ~b->entries[first].item;
-    group groups[PL_GATED_WIDTH] = {group_of(b, first, count)};
-    int number = 1;
-    while (number < PL_GATED_WIDTH) {
-        int widest = -1;
-        for (int i = 0; i < number; i++)
-            if (groups[i].count > 1 && (widest < 0 || groups[i].area > groups[widest].area)) widest = i;
-        if (widest < 0) break;
-        group whole = groups[widest];
-        uint32_t left = divide(b, &whole, level);
-        groups[widest] = group_of(b, whole.first, left);
-        groups[number++] = group_of(b, whole.first + left, whole.count - left);
+    const pl_options *options = &b->scene->options;
+    double bytes, used = (double)b->scene->states.bytes, least = least_bytes(&b->scene->states);
+    /* What has no end looks alike at every scale: small fronts do for it. */
+    const double unasked = b->scene->states.list[0].endless ? 1.25 * used : fmax(DEFAULT_BYTES - used, used);
+    *most = options->front_items > LARGEST_ITEMS ? LARGEST_ITEMS : options->front_items;
+    if (*most) return follow(b, *most, large, &bytes);
+    const double budget = options->memory ? (double)options->memory - used : unasked;
+    if (options->memory && least > budget)
+        return pl_fail(b->error, PL_ERROR_LIMIT, "memory", "this scene needs at least %.0f KB; %.0f KB are allowed",
+                       (used + least) / 1024.0 + 1.0, (double)options->memory / 1024.0);
+    for (*most = LARGEST_ITEMS; *most >= LEAST_ITEMS; *most /= 2) {
+        if (!follow(b, *most, large, &bytes)) return false;
+        if (bytes + least <= budget) return true;
     }
-    uint32_t index = b->node_count++;
-    pl_gated_node node;
-    for (int i = 0; i < PL_GATED_WIDTH; i++) {
-        pl_box box = pl_box_empty();
-        node.child[i] = PL_GATED_NOTHING;
-        for (uint32_t k = 0; i < number && k < groups[i].count; k++)
-            pl_box_join(&box, &b->entries[groups[i].first + k].box);
-        for (int axis = 0; axis < 3; axis++) {
-            node.planes[0][axis][i] = box.lo[axis];
-            node.planes[1][axis][i] = box.hi[axis];
-        }
-        if (i < number) node.child[i] = build_group(b, groups[i].first, groups[i].count, level + 2);
-    }
-    b->nodes[index] = node;
-    return (int32_t)index;
-}
-
-static bool build_tree(pl_scene *scene, const pl_state *state, building *b, pl_gated_tree *tree, pl_error *error)
-{
-    pl_states *states = &scene->states;
-    int32_t *unbounded = NULL;
-    uint32_t bounded = 0;
-    tree->root = PL_GATED_NOTHING;
-    tree->unbounded_count = 0;
-    if (state->unbounded) {
-        unbounded = pl_states_allocate(states, state->item_count * sizeof *unbounded, error);
-        if (!unbounded) return false;
-    }
-    for (uint32_t i = 0; i < state->item_count; i++) {
-        pl_reach reach;
-        if (pl_item_primitives(states, &state->items[i]) == 0) continue;
-        pl_box box = pl_item_box(states, &state->items[i], &reach);
-        if (pl_item_unbounded(states, &state->items[i]) || !(pl_box_is_empty(&box) || pl_box_is_finite(&box)))
-            unbounded[tree->unbounded_count++] = (int32_t)i;
-        else if (!pl_box_is_empty(&box))
-            b->entries[bounded++] = (entry){box, (int32_t)i};
-    }
-    tree->unbounded = unbounded;
-    b->node_count = 0;
-    if (bounded) tree->root = build_group(b, 0, bounded, 0);
-    tree->node_count = b->node_count;
-    pl_gated_node *nodes = pl_states_allocate(states, (b->node_count + 1) * sizeof *nodes, error);
-    if (!nodes) return false;
-    memcpy(nodes, b->nodes, b->node_count * sizeof *nodes);
-    tree->nodes = nodes;
+    *most = 0;
     return true;
 }
 
 bool pl_gated_build(pl_scene *scene, pl_error *error)
 {
-    pl_states *states = &scene->states;
-    uint32_t most = 1;
-    for (uint32_t i = 0; i < states->count; i++)
-        if (states->list[i].item_count > most) most = states->list[i].item_count;
-    building b = {malloc(most * sizeof(entry)), malloc(most * sizeof(pl_gated_node)), 0};
-    pl_gated_tree *trees = pl_states_allocate(states, states->count * sizeof *trees, error);
-    scene->structure = trees;
-    bool ok = trees != NULL;
-    if (ok && (!b.entries || !b.nodes)) ok = pl_fail_memory(error, "building the boxes");
-    for (uint32_t i = 0; ok && i < states->count; i++) ok = build_tree(scene, &states->list[i], &b, &trees[i], error);
-    free(b.entries);
-    free(b.nodes);
-    return ok;
+    const uint32_t count = scene->states.count;
+    pl_gated *gated = calloc(1, sizeof *gated);
+    building b = {scene, gated, pl_compositions_create(&scene->states, error), error};
+    bool *large = calloc(count, sizeof *large), ok = b.compositions != NULL;
+    uint64_t most = 0;
+    scene->structure = gated;
+    if (ok && (!gated || !large || !(gated->states = calloc(count, sizeof *gated->states))))
+        ok = pl_fail_memory(error, "building the rungs");
+    ok = ok && find_nested(&b) && plan(&b, large, &most);
+    for (uint32_t i = 0; ok && i < count; i++) ok = add_rungs(&b, i, large[i] ? most : 0);
+    pl_compositions_free(b.compositions);
+    free(large);
+    if (!ok) return false;
+    pl_gated_rung *exact = realloc(gated->rungs, gated->count * sizeof *exact);
+    if (exact) gated->rungs = exact, gated->capacity = gated->count;
+    gated->sums.limit_items = most;
+    gated->bytes += sizeof *gated + count * sizeof *gated->states + gated->capacity * sizeof *gated->rungs;
+    return true;
 }
 
-/* The trees stand in the states' memory. */
 void pl_gated_destroy(pl_scene *scene)
 {
+    pl_gated *gated = scene->structure;
     scene->structure = NULL;
+    if (!gated) return;
+    for (uint32_t i = 0; i < gated->count; i++) {
+        pl_front_free(&gated->rungs[i].front);
+        free((void *)gated->rungs[i].links);
+    }
+    free(gated->rungs);
+    free(gated->states);
+    free(gated->nested);
+    free(gated);
+}
+
+void pl_gated_count(const pl_scene *scene, pl_statistics *counts)
+{
+    const pl_gated *gated = scene->structure;
+    counts->front_count = gated->count;
+    counts->front_items = gated->sums.items;
+    counts->front_instances = gated->sums.instances;
+    counts->front_limit = gated->sums.limit_items ? gated->sums.limit_items : 1;
+    counts->bytes_nodes = gated->sums.node_bytes;
+    counts->bytes_items = gated->sums.item_bytes + gated->bytes;
+    counts->isa = scene->isa;
 }

@@ -330,7 +330,7 @@ static inline void look(near *n, const pl_frame *f)
 }
 
 /* Writes the children of a node that the ray meets, the nearest last; returns their number. */
-static inline unsigned meet(const near *n, const pl_front_node *node, uint64_t *entries, pl_ref *nearest)
+static inline __attribute__((always_inline)) unsigned meet(const near *n, const pl_front_node *node, uint64_t *entries, pl_ref *nearest)
 {
     wide near_t[3], far_t[3];
 #pragma GCC unroll 3

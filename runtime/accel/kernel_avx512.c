@@ -7,10 +7,12 @@
 #define KERNEL pl_bvh_trace_avx512
 #define TERRAIN_KERNEL pl_terrain_trace_avx512
 #define PACKET_KERNEL pl_bvh_packet_avx512
+#define GATED_KERNEL pl_gated_trace_avx512
 
 #include "kernel_vector.h"
 
 #include "kernel.h"
 #include "kernel_packet.h"
+#include "gated_kernel.h"
 #include "terrain_kernel.h"
 #endif

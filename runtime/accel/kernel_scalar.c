@@ -8,6 +8,7 @@
 
 #define KERNEL pl_bvh_trace_scalar
 #define TERRAIN_KERNEL pl_terrain_trace_scalar
+#define GATED_KERNEL pl_gated_trace_scalar
 
 #define wide_end() ((void)0)
 #define four_fma(a, b, c) ((a) * (b) + (c))
@@ -80,4 +81,5 @@ static inline unsigned wide_order(wide enter, wide leave, const pl_ref *child, u
 }
 
 #include "kernel.h"
+#include "gated_kernel.h"
 #include "terrain_kernel.h"

@@ -92,8 +92,11 @@ bool pl_walk_trace(pl_walk *walk, const pl_scene *scene, pl_counters *counters, 
     memcpy(walk->at.payload, ray->origin, 3 * sizeof(double));
     memcpy(walk->at.payload + 3, ray->direction, 3 * sizeof(double));
     walk->at.payload[STRETCH] = 1.0;
-    walk->at.payload[ENTER] = query->t_min;
-    walk->at.payload[LEAVE] = INFINITY;
+    if (scene->states.cuts) {
+        pl_span span = pl_span_in(&scene->states, 0, ray->origin, ray->direction, (pl_span){query->t_min, INFINITY});
+        walk->at.payload[ENTER] = span.enter;
+        walk->at.payload[LEAVE] = span.leave;
+    }
     return pl_walk_offer(walk, scene, counters, query, missed);
 }
 

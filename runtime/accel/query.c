@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../coverage.h"
 #include "../error.h"
 
 bool pl_query_fail_steps(const pl_query *query, uint64_t limit)
@@ -147,8 +148,10 @@ bool pl_query_leaf(pl_query *query, const pl_leaf *leaf)
 bool pl_query_cut(pl_query *query, const pl_states *states, const pl_arrival *at, uint64_t hash, double t_entry,
                   const pl_leaf *leaf)
 {
-    if (!(t_entry < query->t_max) || !pl_cut_is_drawn(states, at->state, at->d, hash, at->depth, query->ray))
-        return true;
+    if (!(t_entry < query->t_max)) return true;
+    const double share = pl_coverage_of(states, at->state, at->d);
+    if (share < 0.0) return pl_fail_memory(query->error, "measuring coverages");
+    if (!(pl_cut_chance(hash, at->depth, query->ray) < share)) return true;
     pl_leaf cut = *leaf;
     cut.o = at->o;
     cut.d = at->d;
