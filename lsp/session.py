@@ -33,8 +33,9 @@ logger = logging.getLogger(__name__)
 PARSE_ERROR, INVALID_REQUEST, METHOD_NOT_FOUND, INVALID_PARAMS, INTERNAL_ERROR = -32700, -32600, -32601, -32602, -32603
 NOT_INITIALIZED, REQUEST_CANCELLED, CONTENT_MODIFIED = -32002, -32800, -32801
 
-# How long work() may go on before waiting messages are looked at, in seconds; and how often diagnostics are published
-# while it isn't done. The first ones are published at once.
+# How long work() may go on before waiting messages are looked at, and how often diagnostics are published while it isn't
+# done; in seconds of processor time, so that a busy machine doesn't change what is published. After an edit the first ones
+# are published at once; after opening a file, those of the first slice would be a part of those of a short file.
 SLICE = 0.004
 PUBLISH_S = 0.1
 
@@ -264,6 +265,7 @@ class Session:
     def _did_open(self, params: dict) -> None:
         given = params["textDocument"]
         document = self.workspace.did_open(given["uri"], given["text"], given["version"])
+        self._published_at[document] = time.thread_time()
         self._touch(document)
 
     def _did_change(self, params: dict) -> None:
@@ -322,12 +324,12 @@ class Session:
         while self._arrived:
             self._arrived.popleft()()
         finished = self.workspace.project.work(SLICE)
-        documents, now = self._with_neighbours(), time.perf_counter()
+        documents, now = self._with_neighbours(), time.thread_time()
         if finished:
             self._changed.clear()
         if (self.client.get("textDocument") or {}).get("diagnostic") is None:
             for document in documents:
-                if finished or now - self._published_at.get(document, 0.0) > PUBLISH_S:
+                if finished or now - self._published_at.get(document, -PUBLISH_S) >= PUBLISH_S:
                     self._publish(document)
                     self._published_at[document] = now
         if finished:

@@ -81,7 +81,7 @@ class Scene:
         self.is_opening |= len(change.added) >= MANY_BLOCKS
 
     def work(self, deadline: float | None = None) -> bool:
-        """Read and resolve what changes have touched, up to ``deadline`` (of time.perf_counter, in seconds), or up to where
+        """Read and resolve what changes have touched, up to ``deadline`` (of time.thread_time, in seconds), or up to where
         only the rest of a file that was opened is left. True when nothing is left to do."""
         had_edits = bool(self._pending or self._edited or self._dirty)
         if not self.read(deadline):
@@ -98,7 +98,7 @@ class Scene:
             self._dirty.pop(block, None)
             self._opened.pop(block, None)
             self._resolve(block)
-            if deadline is not None and time.perf_counter() > deadline:
+            if deadline is not None and time.thread_time() > deadline:
                 return self.is_current
         return True
 
@@ -107,7 +107,7 @@ class Scene:
         while self._reading is not None or self._pending or not self._names.is_fresh:
             self._reading = self._reading or self._steps()
             for _ in self._reading:
-                if deadline is not None and time.perf_counter() > deadline:
+                if deadline is not None and time.thread_time() > deadline:
                     return False
             self._reading = None
         self.is_opening = False
