@@ -80,6 +80,19 @@ void pl_sampler_begin_tile(pl_sampler *sampler, int left, int top)
     sampler->tile_stamp++;
 }
 
+void pl_sampler_ahead(pl_sampler *sampler, int x, int y)
+{
+    const pl_view *view = pl_shader_view(sampler->shader);
+    const int width = sampler->options->width, height = sampler->options->height;
+    double directions[PL_BLOCK * PL_BLOCK][3];
+    unsigned count = 0;
+    if (sampler->options->antialias != PL_AA_OFF) return;
+    for (int row = y; row < y + PL_BLOCK && row < height; row++)
+        for (int column = x; column < x + PL_BLOCK && column < width; column++)
+            pl_camera_direction(&view->camera, column + 0.5, row + 0.5, width, height, directions[count++]);
+    pl_shade_ahead(sampler->shader, directions, count);
+}
+
 /* The colour at an image point. */
 static bool color_at(const pl_sampler *sampler, double x, double y, double color[3], pl_first *first, pl_error *error)
 {

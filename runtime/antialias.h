@@ -12,6 +12,7 @@
 
 enum {
     PL_TILE = 16, /* pixels a side */
+    PL_BLOCK = 4, /* the same of what pl_sampler_ahead takes */
     PL_LIMIT_GRID = 256,
     PL_LIMIT_ADAPTIVE = 9
 };
@@ -26,6 +27,9 @@ void pl_sampler_destroy(pl_sampler *sampler);
 
 /* Pixels left … left + PL_TILE - 1 and top … top + PL_TILE - 1 come next; they share samples. */
 void pl_sampler_begin_tile(pl_sampler *sampler, int left, int top);
+
+/* The block of pixels from (x, y) on comes next, row by row, and only colours are wanted: its rays may be traced together. */
+void pl_sampler_ahead(pl_sampler *sampler, int x, int y);
 
 /* The colour of a pixel of the tile; first (may be NULL): what the ray through its centre met. */
 bool pl_sampler_pixel(pl_sampler *sampler, int x, int y, double color[3], pl_first *first, pl_error *error);

@@ -98,14 +98,14 @@ static bool is_idle(pl_job *job, uint32_t tile)
            atomic_load_explicit(&job->failed, memory_order_relaxed) < tile;
 }
 
-static bool render_tile(pl_worker *worker, uint32_t tile, pl_error *error)
+static bool render_block(pl_worker *worker, uint32_t tile, int left, int top, pl_error *error)
 {
     pl_job *job = worker->job;
     const int width = job->options->width, height = job->options->height;
-    const int left = (int)(tile % job->columns) * PL_TILE, top = (int)(tile / job->columns) * PL_TILE;
-    pl_sampler_begin_tile(worker->sampler, left, top);
-    for (int y = top; y < height && y < top + PL_TILE; y++)
-        for (int x = left; x < width && x < left + PL_TILE; x++) {
+    if (is_idle(job, tile)) return true;
+    if (!job->wants_first) pl_sampler_ahead(worker->sampler, left, top);
+    for (int y = top; y < height && y < top + PL_BLOCK; y++)
+        for (int x = left; x < width && x < left + PL_BLOCK; x++) {
             const size_t pixel = (size_t)y * (size_t)width + (size_t)x;
             double color[3];
             pl_first first;
@@ -115,6 +115,17 @@ static bool render_tile(pl_worker *worker, uint32_t tile, pl_error *error)
             write_color(job, pixel, color);
             if (job->wants_first) write_first(job->channels, pixel, &first);
         }
+    return true;
+}
+
+static bool render_tile(pl_worker *worker, uint32_t tile, pl_error *error)
+{
+    const pl_job *job = worker->job;
+    const int left = (int)(tile % job->columns) * PL_TILE, top = (int)(tile / job->columns) * PL_TILE;
+    pl_sampler_begin_tile(worker->sampler, left, top);
+    for (int y = top; y < job->options->height && y < top + PL_TILE; y += PL_BLOCK)
+        for (int x = left; x < job->options->width && x < left + PL_TILE; x += PL_BLOCK)
+            if (!render_block(worker, tile, x, y, error)) return false;
     return true;
 }
 

@@ -35,6 +35,10 @@ struct pl_shader {
     size_t count, capacity;
     uint32_t sample_rays;
     pl_ray_counts rays;
+    /* The eye's rays that were traced before they are asked for, and the next of them. */
+    pl_ray ahead[PL_TRACE_MANY];
+    pl_hit ahead_hits[PL_TRACE_MANY];
+    unsigned ahead_count, ahead_next;
 };
 
 /* One hit while it is shaded. */
@@ -90,6 +94,7 @@ pl_shader *pl_shader_create(const pl_view *view, pl_error *error)
     shader->view = view;
     pl_hit_init(&shader->hit);
     pl_hit_init(&shader->blocker);
+    for (int i = 0; i < PL_TRACE_MANY; i++) pl_hit_init(&shader->ahead_hits[i]);
     shader->tracer = pl_tracer_create(view->scene, error);
     if (shader->tracer) return shader;
     pl_shader_destroy(shader);
@@ -102,6 +107,7 @@ void pl_shader_destroy(pl_shader *shader)
     if (shader->tracer) pl_tracer_destroy(shader->tracer);
     pl_hit_free(&shader->hit);
     pl_hit_free(&shader->blocker);
+    for (int i = 0; i < PL_TRACE_MANY; i++) pl_hit_free(&shader->ahead_hits[i]);
     free(shader->waiting);
     free(shader);
 }
@@ -359,9 +365,22 @@ static bool shade_hit(pl_shader *shader, const pl_spotted *at, double color[3], 
     return follow_both(shader, at, error);
 }
 
-static bool find(pl_shader *shader, const pl_ray *ray, pl_surface *surface, pl_error *error)
+/* Whether the hit of an eye's ray is known; then it becomes the shader's. */
+static bool take_ahead(pl_shader *shader, const pl_ray *ray)
 {
-    if (!pl_trace_nearest(shader->tracer, ray, &shader->hit, error)) return false;
+    const unsigned i = shader->ahead_next;
+    if (i >= shader->ahead_count || memcmp(shader->ahead[i].direction, ray->direction, sizeof ray->direction) != 0)
+        return false;
+    const pl_hit hit = shader->ahead_hits[i];
+    shader->ahead_hits[i] = shader->hit;
+    shader->hit = hit;
+    shader->ahead_next++;
+    return true;
+}
+
+static bool find(pl_shader *shader, const pl_ray *ray, bool is_eye, pl_surface *surface, pl_error *error)
+{
+    if (!(is_eye && take_ahead(shader, ray)) && !pl_trace_nearest(shader->tracer, ray, &shader->hit, error)) return false;
     return shader->hit.t == INFINITY || pl_trace_surface(shader->tracer, ray, &shader->hit, surface, error);
 }
 
@@ -372,7 +391,7 @@ static bool find_first(pl_shader *shader, const pl_ray *ray, pl_surface *surface
     const uint64_t box_tests = counters->box_tests;
     counters->miss_depth = 0;
     shader->rays.primary++;
-    if (!find(shader, ray, surface, error)) return false;
+    if (!find(shader, ray, true, surface, error)) return false;
     if (!first) return true;
     if (!pl_trace_number(shader->tracer, &shader->hit, error)) return false;
     first->t = shader->hit.t;
@@ -396,6 +415,19 @@ static void set_eye_ray(const pl_shader *shader, const double direction[3], pl_b
     eye->width = 0.0;
     eye->weight = 1.0;
     eye->level = 0;
+}
+
+void pl_shade_ahead(pl_shader *shader, const double (*directions)[3], unsigned count)
+{
+    pl_error error; /* comes again when the ray is asked for */
+    shader->ahead_count = shader->ahead_next = 0;
+    if (!pl_trace_has_packets(shader->tracer)) return;
+    for (unsigned i = 0; i < count; i++) {
+        pl_bounce eye;
+        set_eye_ray(shader, directions[i], &eye);
+        set_ray(shader, &eye, &shader->ahead[i]);
+    }
+    shader->ahead_count = pl_trace_nearest_many(shader->tracer, shader->ahead, count, shader->ahead_hits, &error);
 }
 
 bool pl_shade_first(pl_shader *shader, const double direction[3], pl_first *first, pl_error *error)
@@ -424,7 +456,7 @@ bool pl_shade(pl_shader *shader, const double direction[3], double color[3], pl_
         pl_surface surface;
         set_ray(shader, &bounce, &ray);
         pl_spotted at;
-        if (!(is_eye ? find_first(shader, &ray, &surface, first, error) : find(shader, &ray, &surface, error)))
+        if (!(is_eye ? find_first(shader, &ray, &surface, first, error) : find(shader, &ray, false, &surface, error)))
             return false;
         if (shader->hit.t == INFINITY)
             for (int c = 0; c < 3; c++) color[c] += bounce.share[c] * view->background[c];

@@ -53,6 +53,9 @@ typedef struct pl_first {
 /* The colour seen from the camera in a unit direction; first may be NULL. */
 bool pl_shade(pl_shader *shader, const double direction[3], double color[3], pl_first *first, pl_error *error);
 
+/* Traces the eye's rays in up to PL_TRACE_MANY directions that will be asked for next, in this order. It only saves time. */
+void pl_shade_ahead(pl_shader *shader, const double (*directions)[3], unsigned count);
+
 /* The first hit alone. */
 bool pl_shade_first(pl_shader *shader, const double direction[3], pl_first *first, pl_error *error);
 

@@ -129,6 +129,11 @@ static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, unsigned count, 
     return accel->trace_packet(tracer, rays, queries, count);
 }
 
+bool pl_trace_has_packets(const pl_tracer *tracer)
+{
+    return tracer->scene->accel->is_packet != NULL;
+}
+
 unsigned pl_trace_nearest_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_hit *hits, pl_error *error)
 {
     if (trace_packet(tracer, rays, count, hits)) return count;

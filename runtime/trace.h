@@ -59,6 +59,7 @@ bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_erro
 /* The same for up to PL_TRACE_MANY rays, which are traced as a packet where they go about the same way: the same hits.
  * Returns how many were traced before an error: `count` without. */
 enum { PL_TRACE_MANY = 16 };
+bool pl_trace_has_packets(const pl_tracer *tracer);
 unsigned pl_trace_nearest_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_hit *hits, pl_error *error);
 
 /* Makes sure that a hit's primitive index is known: where states are unfolded on touch, tracing doesn't count. */

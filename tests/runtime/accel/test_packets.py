@@ -86,3 +86,16 @@ def test_packets_share_their_steps():
             tests[isa] = scene.statistics["box_tests"]
     for isa, count in tests.items():
         assert isa == "scalar" or count < 0.5 * tests["scalar"]
+
+
+@pytest.mark.parametrize("size", [(32, 32), (19, 13), (3, 2), (1, 1)])
+def test_pictures_are_the_same_whose_rays_go_together(size):
+    """Blocks of pixels at the picture's edges are smaller; with another channel every ray goes alone."""
+    data = compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 6})
+    with Scene(data) as scene:
+        together = scene.render(*size)["color"]
+        alone = scene.render(*size, channels=("color", "boxes"))["color"]
+    with Scene(data, accelerator="boxes") as scene:
+        expected = scene.render(*size)["color"]
+    np.testing.assert_array_equal(together, expected)
+    np.testing.assert_array_equal(alone, expected)
