@@ -120,6 +120,9 @@ class PlStatistics(ctypes.Structure):
         ("lazy_found", c_uint64),
         ("terrain_tiles", c_uint64),
         ("seconds_first_pixel", c_double),
+        *((f"front_{name}", c_uint64) for name in ("pilot_rays", "flat_bytes")),
+        ("front_entries", c_double),
+        ("front_pilot_seconds", c_double),
     ]
 
 

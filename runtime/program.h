@@ -56,11 +56,12 @@ typedef struct pl_case {
 
 /* A constant transformation, with its inverse. */
 typedef struct pl_transform {
-    pl_affine to_parent; /* object to parent, as in the file */
     pl_affine to_object; /* the inverse; unspecified if singular */
-    double stretch;      /* the largest singular value of to_parent, rounded up; set where detail cut-offs need it */
     bool singular;       /* the subtree below is to be dropped and counted */
     uint8_t form;        /* pl_form of to_object */
+    /* What follows is needed for building only: packed states (state.h) leave it out. */
+    pl_affine to_parent; /* object to parent, as in the file */
+    double stretch;      /* the largest singular value of to_parent, rounded up; set where detail cut-offs need it */
 } pl_transform;
 
 /* What of a map isn't trivial: rays through a translation or a scaling take less arithmetic. */

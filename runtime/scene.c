@@ -194,6 +194,24 @@ static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
     return !states->cuts || (states->coverage = pl_coverage_create(states, error)) != NULL;
 }
 
+/* The accelerator's structure. Fronts that don't fit into the memory that was asked for are left, and states with them: they are
+ * unfolded on touch. Where there isn't enough for that either, what fronts need is told. */
+static bool build_structure(pl_scene *scene, pl_error *error)
+{
+    pl_error why = {.code = PL_OK}, ignored;
+    if (!scene->accel->build || scene->accel->build(scene, &why)) return true;
+    if (scene->accel != &pl_accel_bvh || why.code != PL_ERROR_LIMIT || strcmp(why.place, "memory") != 0) {
+        *error = why;
+        return false;
+    }
+    pl_fronts_destroy(scene);
+    pl_states_free(&scene->states);
+    scene->accel = &pl_accel_lazy;
+    if (scene->accel->build(scene, &ignored)) return true;
+    *error = why;
+    return false;
+}
+
 static bool build(pl_scene *scene, pl_error *error)
 {
     double start = pl_seconds();
@@ -202,7 +220,7 @@ static bool build(pl_scene *scene, pl_error *error)
     double before_states = pl_seconds();
     if (!build_states(scene, limit, error)) return false;
     scene->statistics.seconds_states = pl_seconds() - before_states;
-    if (scene->accel->build && !scene->accel->build(scene, error)) return false;
+    if (!build_structure(scene, error)) return false;
     scene->all_opaque = is_opaque(scene->program);
 
     pl_statistics *counts = &scene->statistics;

@@ -304,8 +304,9 @@ class Scene:
         largest error bound of their distance, in scene units}, lazy {unfolded, evicted: states, where there are too many to
         build; found: times that a ray came to one in memory; states, bytes, classes: of these in memory now}.
 
-        Of bvh: isa (None: another accelerator), front {count, items, instances: items that are one, limit: items that one may
-        have, None: any number}, instances (entered), filtered (primitives tried in single precision). bytes {program, meshes,
+        Of bvh: isa (None: another accelerator), front {count, items, instances: items that are one, limit: items that one
+        has, None: everything; where not everything fits, pilot_rays, pilot_seconds, entries: instances that a ray is then expected to enter,
+        flat_bytes: what everything would take}, instances (entered), filtered (primitives tried in single precision). bytes {program, meshes,
         states, nodes, items} is scene_bytes by structure; seconds["states"] is a part of seconds["build"]. terrain {tiles}: where
         the scene is a regular subdivision, there are neither states nor fronts, and items are tiles of triangles.
         """

@@ -15,12 +15,6 @@
 
 enum { FIRST_TABLE = 64, FIRST_BLOCK = 4096, LARGEST_BLOCK = 1 << 20 };
 
-struct pl_block {
-    struct pl_block *next;
-    size_t used, size;
-    _Alignas(16) unsigned char memory[];
-};
-
 typedef struct visit {
     uint32_t state, next_item;
     uint32_t lowest;        /* the first open state that this one leads to (Tarjan 1972): states stand in visiting order */
@@ -102,13 +96,18 @@ static void *keep(builder *b, const void *data, size_t bytes)
     return place;
 }
 
+void pl_blocks_free(struct pl_block *blocks)
+{
+    while (blocks) {
+        struct pl_block *next = blocks->next;
+        free(blocks);
+        blocks = next;
+    }
+}
+
 void pl_states_free(pl_states *states)
 {
-    for (struct pl_block *block = states->blocks; block;) {
-        struct pl_block *next = block->next;
-        free(block);
-        block = next;
-    }
+    pl_blocks_free(states->blocks);
     free(states->list);
     free(states->table);
     free(states->node_boxes);

@@ -85,6 +85,19 @@ bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree 
                      size_t limit, uint32_t most, pl_error *error);
 void pl_states_free(pl_states *states);
 
+/* The items as they were before packing, for those who still point at them. */
+typedef struct pl_unpacked {
+    const pl_item **items; /* of each state */
+    struct pl_block *blocks;
+} pl_unpacked;
+
+/* Moves what tracing needs into one block of exact size: items, terms, to_object and form of transformations (the rest of
+ * pl_transform is gone). Boxes and counts stay; nothing can be looked up or built from the states afterwards. */
+bool pl_states_pack(pl_states *states, pl_unpacked *old, pl_error *error);
+/* What they will take then. */
+bool pl_states_packed_bytes(const pl_states *states, size_t *bytes, pl_error *error);
+void pl_unpacked_free(pl_unpacked *old);
+
 /* The primitive index, in derivation order, of the leaf at a path; UINT64_MAX if the path doesn't exist. depth: 0, or
  * the number of symbols entered where the path ends at an instance of a state: then its first primitive's. */
 uint64_t pl_states_locate(const pl_states *states, const pl_path *path, uint32_t depth);
@@ -117,6 +130,14 @@ void pl_join_node_boxes(pl_states *states, const pl_item *item, const pl_trail_n
 
 /* The same for a finished state and its S-node. */
 void pl_join_symbol_box(pl_states *states, uint32_t state);
+
+/* Memory of states: blocks, the newest first. */
+struct pl_block {
+    struct pl_block *next;
+    size_t used, size;
+    _Alignas(16) unsigned char memory[];
+};
+void pl_blocks_free(struct pl_block *blocks);
 
 /* Bump allocation within the limit; freed with the states. NULL: error is set. */
 void *pl_states_allocate(pl_states *states, size_t bytes, pl_error *error);

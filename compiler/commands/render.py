@@ -45,6 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--memory", type=memory, metavar="SIZE", help="of states and structures: 64K, 1M, 2G (default: by the caches)"
     )
+    parser.add_argument(
+        "--front", type=front, metavar="K", help="at most K items in a front of bvh, or all (default: by the memory)"
+    )
     parser.add_argument("--grid", type=voxels, metavar="NxMxK", help="voxels of --accel grid (default 16x16x8)")
     parser.add_argument("--antialias", type=antialias, default=("off", 0, 0.0), metavar="A", help=ANTIALIAS)
     parser.add_argument("--aov", type=aov_names, default=(), metavar="A,B", help=f"extra channels: {', '.join(AOVS)}")
@@ -69,6 +72,15 @@ def memory(text: str) -> int:
     if not 1 <= size < 2**63:
         raise argparse.ArgumentTypeError(f"'{text}' isn't a size in bytes, such as 64K, 1M or 2G")
     return size
+
+
+def front(text: str) -> int:
+    """``21`` → 21; ``all`` → as many as there are."""
+    if text == "all":
+        return 2**64 - 1
+    if not text.isdecimal() or not 1 <= int(text) < 2**63:
+        raise argparse.ArgumentTypeError(f"'{text}' isn't a number of items, 1 or more, or all")
+    return int(text)
 
 
 def antialias(text: str) -> tuple[str, int, float]:
@@ -139,6 +151,7 @@ def run(arguments: argparse.Namespace) -> int:
         threads=arguments.threads or None,
         povray_epsilon=arguments.povray_epsilon,
         memory=arguments.memory,
+        front_items=arguments.front,
         grid=arguments.grid,
         detail=arguments.detail,
     ) as scene:

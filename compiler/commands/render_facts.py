@@ -59,7 +59,20 @@ def facts(arguments: argparse.Namespace, statistics: dict, seconds: dict[str, fl
 def explanation(statistics: dict, facts: dict) -> list[str]:
     """Lines of ``--explain``: what was built, its bytes and time, and what was left out."""
     rows = [f"built: {name:<13} {size:>14,} bytes  {text}" for name, size, text in _built(statistics)]
-    return rows + [f"left out: {row['what']}: {row['why']}" for row in facts["left_out"]]
+    left_out = [(row["what"], row["why"]) for row in facts["left_out"]] + _not_opened(statistics)
+    return rows + [f"left out: {what}: {why}" for what, why in left_out]
+
+
+def _not_opened(statistics: dict) -> list[tuple[str, str]]:
+    """What fronts don't hold, by the estimate that decided it."""
+    front = statistics["front"]
+    if not front["instances"]:
+        return []
+    text = f"{front['instances']:,} instances stay closed"
+    if front["pilot_rays"]:
+        text += f"; {front['pilot_rays']} pilot rays in {front['pilot_seconds']:.4f} s expect {front['entries']:.1f} entered a ray"
+        text += f", and the flat scene to take {front['flat_bytes']:,} bytes"
+    return [("larger fronts", text)]
 
 
 def _built(statistics: dict) -> list[tuple[str, int, str]]:

@@ -1,172 +1,215 @@
-/* front.c - all fronts of a scene: how many items each may have under the budget, then building them (front.h). */
+/* front.c - all fronts of a scene: the budget, then opening the states and building their trees (front.h). */
 #include "front.h"
 
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "../error.h"
 
-enum { DEFAULT_CACHE = 1 << 20, LEAST_ITEMS = 21 };
+enum { DEFAULT_CACHE = 1 << 20, LARGE_FRONT = 1 << 14, MOST_THREADS = 64 };
 
-/* A primitive's share of nodes: 6 of eight children are there, one of them a node. */
-#define NODE_BYTES_AN_ITEM (sizeof(pl_front_node) / 5.0)
+/* Of a core's second-level cache, what states and fronts may take unless something else is asked for: what rays keep
+ * touching should stay there (engine measurements: residency, not arithmetic, decides), beside stacks and pixels. */
+#define CACHE_SHARE 0.45
+/* Where the graph itself is larger than that: a little more than it needs. */
+#define LEAST_GROWTH 1.2
+/* What there may be at once while building: a process that traces takes SPARE more than its scene anyway. */
+#define SPARE (256 << 10)
+#define MOST_AT_ONCE 1.05
 
 /* --- the budget --- */
 
-/* Half of a core's second-level cache: what rays keep touching should stay there (engine measurements: residency, not
- * arithmetic, decides). */
-static size_t cache_bytes(void)
+static double cache_bytes(void)
 {
     long size = sysconf(_SC_LEVEL2_CACHE_SIZE);
-    return size > 0 ? (size_t)size / 2 : DEFAULT_CACHE / 2;
+    return CACHE_SHARE * (double)(size > 0 ? size : DEFAULT_CACHE);
 }
 
-/* What the fronts that the scene's front leads to take with at most `most` items each: an estimate for trees, exact
- * for the rest. Stops early above `enough`. false: no memory. */
-static bool measure(const pl_compositions *compositions, const pl_states *states, uint64_t most, double enough,
-                    double *bytes, bool *flat, pl_error *error)
+/* What is there while fronts are built and gone afterwards: states before they are packed, compositions. */
+static double building_bytes(const pl_scene *scene, const pl_compositions *compositions)
 {
-    pl_state_list reached = {0};
-    bool *seen = calloc(states->count, sizeof *seen), ok = seen != NULL;
-    size_t done = 0;
-    uint32_t state = 0;
-    *bytes = 0.0;
-    *flat = true;
-    if (!ok) pl_fail_memory(error, "planning the fronts");
-    while (ok && *bytes <= enough) {
-        if (!seen[state]) {
-            pl_front_counts counts;
-            seen[state] = true;
-            ok = pl_front_count(compositions, state, most, &counts, &reached, error);
-            double items = (double)(counts.primitives + counts.instances);
-            *bytes += sizeof(pl_front) + (double)counts.primitives * sizeof(pl_front_primitive) +
-                      (double)counts.instances * sizeof(pl_front_instance) +
-                      (double)counts.opened * sizeof(pl_opened) + items * NODE_BYTES_AN_ITEM;
-            if (counts.instances) *flat = false;
-        }
-        if (done == reached.count) break;
-        state = reached.list[done++];
-    }
-    free(reached.list);
-    free(seen);
-    return ok;
+    return (double)scene->states.bytes + (double)pl_compositions_bytes(compositions);
 }
 
-/* The largest K whose fronts fit into `budget` bytes; 0: not even K = 1. */
-static bool choose(const pl_compositions *compositions, const pl_states *states, double budget, uint64_t *most,
-                   double *floor, pl_error *error)
-{
-    bool flat;
-    double bytes;
-    *most = 0;
-    if (!measure(compositions, states, 1, INFINITY, floor, &flat, error)) return false;
-    if (*floor > budget) return true;
-    *most = flat ? UINT64_MAX : 1;
-    if (flat) return true;
-    double whole = (double)states->list[0].primitives * (sizeof(pl_front_primitive) + NODE_BYTES_AN_ITEM);
-    if (whole <= budget) {
-        if (!measure(compositions, states, UINT64_MAX, budget, &bytes, &flat, error)) return false;
-        if (bytes <= budget) *most = UINT64_MAX;
-        if (bytes <= budget) return true;
-    }
-    for (uint64_t k = 4; k < PL_REF_INDEX; k += k / 2) {
-        if (!measure(compositions, states, k, budget, &bytes, &flat, error)) return false;
-        if (bytes > budget) return true;
-        *most = k;
-    }
-    return true;
-}
-
-/* K for the scene's options: as asked for, or by the budget. Without one: what half of the cache holds, or, where the
- * graph itself is larger, a little unfolding. */
-static bool plan(const pl_scene *scene, const pl_compositions *compositions, uint64_t *most, pl_error *error)
+/* A plan for what the scene's options ask for: so many items; as much as fits into `memory`; or what pays, as far as the
+ * cache reaches. */
+static bool choose(const pl_scene *scene, const pl_compositions *compositions, pl_fronts *fronts, pl_front_plan **plan,
+                   pl_error *error)
 {
     const pl_options *options = &scene->options;
-    double floor, used = (double)scene->states.bytes;
-    if (options->front_items) {
-        *most = options->front_items;
-        return true;
+    const double primitives = (double)scene->states.list[0].primitives;
+    if (!(*plan = pl_front_plan_create(compositions, NULL, false, error))) return false;
+    if (options->front_items) return pl_front_plan_items(*plan, options->front_items, error);
+    size_t states;
+    if (!pl_states_packed_bytes(&scene->states, &states, error)) return false;
+    const bool fill = options->memory > 0;
+    double budget = cache_bytes() - (double)states;
+    if (fill) {
+        const double at_once = MOST_AT_ONCE * (double)options->memory + SPARE - building_bytes(scene, compositions);
+        budget = fmin((double)options->memory, at_once) - (double)states;
     }
-    double budget = options->memory ? (double)options->memory - used : (double)cache_bytes();
-    if (!choose(compositions, &scene->states, budget, most, &floor, error)) return false;
-    if (*most) return true;
-    if (!options->memory) {
-        *most = LEAST_ITEMS;
-        return true;
+    if (primitives * sizeof(pl_front_primitive) < budget) {
+        if (!pl_front_plan_items(*plan, UINT64_MAX, error)) return false;
+        if ((*plan)->estimate + primitives * (fill ? sizeof(pl_boxed) / MOST_AT_ONCE : 0.0) <= budget) return true;
     }
+    pl_pilot pilot;
+    pl_front_plan_free(*plan);
+    *plan = NULL;
+    const double start = pl_seconds();
+    bool fits, ok = pl_pilot_fly(&pilot, scene, compositions, error);
+    fronts->pilot_seconds = pl_seconds() - start;
+    fronts->pilot_rays = pilot.rays;
+    fronts->flat_bytes = primitives < 1e17 ? (uint64_t)(primitives * pl_front_plan_flat_bytes()) : UINT64_MAX;
+    double floor;
+    ok = ok && (*plan = pl_front_plan_create(compositions, &pilot, true, error)) &&
+         pl_front_plan_budget(*plan, budget, fill, &floor, &fits, error);
+    pl_pilot_free(&pilot);
+    if (!ok || fits) return ok;
+    if (!fill) return pl_front_plan_budget(*plan, LEAST_GROWTH * floor, false, &floor, &fits, error);
+    const double needed = (double)states + floor;
+    const double at_once = (building_bytes(scene, compositions) + needed - SPARE) / MOST_AT_ONCE;
     return pl_fail(error, PL_ERROR_LIMIT, "memory", "this scene needs at least %.0f KB; %.0f KB are allowed",
-                   (used + floor) / 1024.0 + 1.0, (double)options->memory / 1024.0);
+                   fmax(needed, at_once) / 1024.0 + 1.0, (double)options->memory / 1024.0);
 }
 
 /* --- one front --- */
 
-static void *copy(const void *data, size_t bytes, size_t *total)
+/* Builds a front's tree and gives it its items; what they were listed with is freed. */
+static bool keep(pl_front *front, pl_front_items *items, int threads)
 {
-    size_t rounded = (bytes + 64) & ~(size_t)63;
-    void *place = aligned_alloc(64, rounded);
-    if (place && bytes) memcpy(place, data, bytes);
-    *total += rounded;
-    return place;
-}
-
-/* Moves the items and their tree into memory of exact size. */
-static bool keep(pl_fronts *fronts, pl_front *front, pl_front_items *items, int threads)
-{
-    pl_front_node *nodes = aligned_alloc(64, (pl_front_most_nodes(items->box_count) * sizeof *nodes + 63) & ~(size_t)63);
-    if (!nodes) return false;
-    uint32_t count = pl_front_tree(items->boxes, items->box_count, nodes, &front->root, threads);
-    size_t node_bytes = 0, item_bytes = 0;
-    front->nodes = copy(nodes, count * sizeof *nodes, &node_bytes);
-    free(nodes);
-    front->primitives = copy(items->primitives, items->primitive_count * sizeof *items->primitives, &item_bytes);
-    front->instances = copy(items->instances, items->instance_count * sizeof *items->instances, &item_bytes);
-    front->opened = copy(items->opened, items->opened_count * sizeof *items->opened, &item_bytes);
-    front->unbounded = copy(items->unbounded, items->unbounded_count * sizeof *items->unbounded, &item_bytes);
+    front->nodes = pl_front_tree(items->boxes, items->box_count, &front->node_count, &front->root, threads);
+    front->primitives = items->primitives;
+    front->instances = items->instances;
+    front->opened = items->opened;
+    front->unbounded = items->unbounded;
     front->unbounded_count = (uint32_t)items->unbounded_count;
-    fronts->nodes += count;
-    fronts->items += items->primitive_count + items->instance_count;
-    fronts->instances += items->instance_count;
-    fronts->opened += items->opened_count;
-    fronts->node_bytes += node_bytes;
-    fronts->item_bytes += item_bytes;
-    return front->nodes && front->primitives && front->instances && front->opened && front->unbounded;
+    front->opened_count = (uint32_t)items->opened_count;
+    front->instance_count = (uint32_t)items->instance_count;
+    items->primitives = NULL;
+    items->instances = NULL;
+    items->opened = NULL;
+    items->unbounded = NULL;
+    return front->nodes != NULL;
 }
 
-/* The front of a state, which may be new: then it stands at the end of the list, to be built. */
-static bool front_of(pl_fronts *fronts, uint32_t state, uint32_t *index)
+static bool build_front(const pl_scene *scene, const pl_front_plan *plan, pl_front *front, int threads, pl_error *error)
 {
-    if (fronts->of_state[state]) {
-        *index = fronts->of_state[state] - 1;
-        return true;
-    }
-    if (fronts->count == fronts->capacity) {
-        uint32_t capacity = fronts->capacity ? 2 * fronts->capacity : 16;
-        pl_front *list = realloc(fronts->list, capacity * sizeof *list);
-        if (!list) return false;
-        fronts->list = list;
-        fronts->capacity = capacity;
-    }
-    *index = fronts->count++;
-    fronts->of_state[state] = fronts->count;
-    memset(&fronts->list[*index], 0, sizeof *fronts->list);
-    fronts->list[*index].state = state;
-    return true;
-}
-
-bool pl_front_make(const pl_scene *scene, const pl_compositions *compositions, uint32_t state, uint64_t most,
-                   pl_fronts *sums, pl_front *front, pl_error *error)
-{
-    pl_front_items items = {0};
-    *front = (pl_front){.state = state};
-    pl_front_set_frame(front, &scene->states, state);
-    bool ok = pl_front_open(compositions, front, most, &items, error);
-    if (ok && (items.primitive_count > PL_REF_INDEX || items.instance_count > PL_REF_INDEX))
-        ok = pl_fail(error, PL_ERROR_LIMIT, "memory", "a front of more than %d items", PL_REF_INDEX);
-    if (ok && !keep(sums, front, &items, scene->threads)) ok = pl_fail_memory(error, "building the fronts");
-    front->instance_count = (uint32_t)items.instance_count;
+    const pl_front_counts *counts = &plan->counts[front->state];
+    pl_front_items items;
+    pl_front_set_frame(front, &scene->states, front->state);
+    if (counts->primitives > PL_REF_INDEX || counts->instances > PL_REF_INDEX || counts->opened > UINT32_MAX)
+        return pl_fail(error, PL_ERROR_LIMIT, "memory", "a front of more than %d items", PL_REF_INDEX);
+    bool ok = pl_front_open(plan, front, threads, &items, error);
+    if (ok && !keep(front, &items, threads)) ok = pl_fail_memory(error, "building the fronts");
     pl_front_items_free(&items);
     return ok;
+}
+
+/* --- all fronts --- */
+
+typedef struct task {
+    const pl_scene *scene;
+    const pl_front_plan *plan;
+    pl_fronts *fronts;
+    atomic_uint next;
+    atomic_bool failed;
+    pthread_mutex_t lock; /* of error */
+    pl_error error;
+} task;
+
+static bool is_large(const pl_front_plan *plan, const pl_front *front)
+{
+    const pl_front_counts *counts = &plan->counts[front->state];
+    return counts->primitives + counts->instances >= LARGE_FRONT;
+}
+
+static void *build_small(void *context)
+{
+    task *t = context;
+    for (uint32_t i; (i = atomic_fetch_add(&t->next, 1)) < t->fronts->count && !atomic_load(&t->failed);) {
+        pl_error error = {.code = PL_OK};
+        if (is_large(t->plan, &t->fronts->list[i])) continue;
+        if (build_front(t->scene, t->plan, &t->fronts->list[i], 1, &error)) continue;
+        pthread_mutex_lock(&t->lock);
+        t->error = error;
+        atomic_store(&t->failed, true);
+        pthread_mutex_unlock(&t->lock);
+    }
+    return NULL;
+}
+
+/* Small fronts by one thread each, large ones one after another by all. */
+static bool build_fronts(const pl_scene *scene, const pl_front_plan *plan, pl_fronts *fronts, pl_error *error)
+{
+    task t = {.scene = scene, .plan = plan, .fronts = fronts, .lock = PTHREAD_MUTEX_INITIALIZER};
+    pthread_t started[MOST_THREADS];
+    int others = 0, threads = scene->threads < MOST_THREADS ? scene->threads : MOST_THREADS;
+    for (uint32_t i = 0; i < fronts->count; i++)
+        if (is_large(plan, &fronts->list[i]) && !build_front(scene, plan, &fronts->list[i], threads, error)) return false;
+    if (fronts->count < 2 || plan->estimate < 1e5) threads = 1;
+    while (others < threads - 1 && pthread_create(&started[others], NULL, build_small, &t) == 0) others++;
+    build_small(&t);
+    for (int i = 0; i < others; i++) pthread_join(started[i], NULL);
+    if (atomic_load(&t.failed)) *error = t.error;
+    return !atomic_load(&t.failed);
+}
+
+/* Fronts in the plan's order. */
+static bool list_fronts(pl_fronts *fronts, pl_front_plan *plan)
+{
+    const uint32_t states = plan->compositions->states->count;
+    for (uint32_t i = 0; i < states; i++)
+        if (plan->visits[plan->order[i]] > 0.0) plan->front_of[plan->order[i]] = ++fronts->count;
+    fronts->list = calloc(fronts->count, sizeof *fronts->list);
+    for (uint32_t i = 0; fronts->list && i < states; i++)
+        if (plan->front_of[i]) fronts->list[plan->front_of[i] - 1].state = i;
+    return fronts->list;
+}
+
+static size_t rounded(size_t bytes)
+{
+    return (bytes + 64) & ~(size_t)63;
+}
+
+static void add_to(pl_fronts *sums, const pl_front *front, const pl_front_counts *counts)
+{
+    const uint64_t items = counts->primitives + counts->instances;
+    sums->items += items;
+    sums->nodes += front->node_count;
+    sums->opened += counts->opened;
+    sums->instances += counts->instances;
+    if (items > sums->most_items) sums->most_items = items;
+    sums->node_bytes += rounded(front->node_count * sizeof *front->nodes);
+    sums->item_bytes += rounded(counts->primitives * sizeof *front->primitives) +
+                        rounded(counts->instances * sizeof *front->instances) +
+                        rounded(counts->opened * sizeof *front->opened) +
+                        (front->unbounded_count + 1) * sizeof *front->unbounded;
+}
+
+/* --- a front by itself --- */
+
+static pl_front_plan *single_plan(pl_compositions *compositions, pl_error *error)
+{
+    if (compositions->single) return compositions->single;
+    pl_front_plan *plan = compositions->single = pl_front_plan_create(compositions, NULL, false, error);
+    for (uint32_t i = 0; plan && i < compositions->states->count; i++) plan->front_of[i] = i + 1;
+    return plan;
+}
+
+bool pl_front_make(const pl_scene *scene, pl_compositions *compositions, uint32_t state, uint64_t most, pl_fronts *sums,
+                   pl_front *front, pl_error *error)
+{
+    pl_front_counts counts;
+    pl_front_plan *plan = single_plan(compositions, error);
+    *front = (pl_front){.state = state};
+    if (!plan || !pl_front_plan_single(plan, state, most, &counts, error)) return false;
+    if (!build_front(scene, plan, front, scene->threads, error)) return false;
+    add_to(sums, front, &counts);
+    return true;
 }
 
 void pl_front_free(pl_front *front)
@@ -178,39 +221,50 @@ void pl_front_free(pl_front *front)
     free((void *)front->unbounded);
 }
 
-/* The fronts that instances name by their states are listed, to be built later. */
-static bool build_front(pl_scene *scene, pl_fronts *fronts, const pl_compositions *compositions, uint32_t index,
-                        pl_error *error)
+bool pl_front_count(pl_compositions *compositions, uint32_t state, uint64_t most, pl_front_counts *counts,
+                    pl_state_list *closed, pl_error *error)
 {
-    pl_front front;
-    bool ok = pl_front_make(scene, compositions, fronts->list[index].state, fronts->limit_items, fronts, &front, error);
-    for (size_t i = 0; ok && i < front.instance_count; i++) {
-        uint32_t *to = (uint32_t *)&front.instances[i].front;
-        if (!front_of(fronts, *to, to)) ok = pl_fail_memory(error, "building the fronts");
+    pl_front_plan *plan = single_plan(compositions, error);
+    if (!plan || !pl_front_plan_single(plan, state, most, counts, error)) return false;
+    plan->counting.closed = closed;
+    bool ok = pl_front_plan_count(plan, &plan->counting, state, state, 1.0, counts);
+    plan->counting.closed = NULL;
+    return ok || pl_fail_memory(error, "planning the fronts");
+}
+
+/* Packs the states, which nothing is built from any more, and turns what points at their items. */
+static bool pack(pl_scene *scene, pl_fronts *fronts, pl_error *error)
+{
+    pl_unpacked old;
+    if (!pl_states_pack(&scene->states, &old, error)) return false;
+    for (uint32_t i = 0; i < fronts->count; i++) {
+        pl_front *front = &fronts->list[i];
+        pl_opened *opened = (pl_opened *)front->opened;
+        for (uint32_t k = 1; k < front->opened_count; k++) { /* parents stand before their children */
+            uint32_t parent = opened[k].parent, state = parent ? opened[parent].item->what : front->state;
+            opened[k].item = &scene->states.list[state].items[opened[k].item - old.items[state]];
+        }
     }
-    fronts->list[index] = front;
-    return ok;
+    pl_unpacked_free(&old);
+    return true;
 }
 
 bool pl_fronts_build(pl_scene *scene, pl_error *error)
 {
-    pl_fronts *fronts = calloc(1, sizeof *fronts);
+    pl_fronts *fronts = scene->structure = calloc(1, sizeof *fronts);
+    if (!fronts) return pl_fail_memory(error, "building the fronts");
+    pl_front_plan *plan = NULL;
     pl_compositions *compositions = pl_compositions_create(&scene->states, error);
-    scene->structure = fronts;
-    bool ok = compositions != NULL;
-    if (ok && (!fronts || !(fronts->of_state = calloc(scene->states.count, sizeof *fronts->of_state))))
-        ok = pl_fail_memory(error, "building the fronts");
-    ok = ok && plan(scene, compositions, &fronts->limit_items, error);
-    uint32_t first;
-    if (ok && !front_of(fronts, 0, &first)) ok = pl_fail_memory(error, "building the fronts");
-    for (uint32_t i = 0; ok && i < fronts->count; i++) ok = build_front(scene, fronts, compositions, i, error);
+    bool ok = compositions && choose(scene, compositions, fronts, &plan, error);
+    if (ok && !list_fronts(fronts, plan)) ok = pl_fail_memory(error, "building the fronts");
+    ok = ok && build_fronts(scene, plan, fronts, error);
+    for (uint32_t i = 0; ok && i < fronts->count; i++)
+        add_to(fronts, &fronts->list[i], &plan->counts[fronts->list[i].state]);
+    fronts->bytes = sizeof *fronts + fronts->count * sizeof *fronts->list + fronts->node_bytes + fronts->item_bytes;
+    fronts->entries = ok ? plan->entries : 0.0;
+    pl_front_plan_free(plan);
     pl_compositions_free(compositions);
-    if (!ok) return false;
-    free(fronts->of_state);
-    fronts->of_state = NULL;
-    fronts->flat = fronts->instances == 0;
-    fronts->bytes = sizeof *fronts + fronts->capacity * sizeof *fronts->list + fronts->node_bytes + fronts->item_bytes;
-    return true;
+    return ok && pack(scene, fronts, error);
 }
 
 void pl_fronts_destroy(pl_scene *scene)
@@ -218,9 +272,8 @@ void pl_fronts_destroy(pl_scene *scene)
     pl_fronts *fronts = scene->structure;
     scene->structure = NULL;
     if (!fronts) return;
-    for (uint32_t i = 0; i < fronts->count; i++) pl_front_free(&fronts->list[i]);
+    for (uint32_t i = 0; i < fronts->count && fronts->list; i++) pl_front_free(&fronts->list[i]);
     free(fronts->list);
-    free(fronts->of_state);
     free(fronts);
 }
 
@@ -230,8 +283,12 @@ void pl_fronts_count(const pl_scene *scene, pl_statistics *counts)
     counts->front_count = fronts->count;
     counts->front_items = fronts->items;
     counts->front_instances = fronts->instances;
-    counts->front_limit = fronts->flat ? UINT64_MAX : fronts->limit_items;
+    counts->front_limit = fronts->instances ? fronts->most_items : UINT64_MAX;
     counts->bytes_nodes = fronts->node_bytes;
     counts->bytes_items = fronts->bytes - fronts->node_bytes;
     counts->isa = scene->isa;
+    counts->front_pilot_rays = fronts->pilot_rays;
+    counts->front_flat_bytes = fronts->flat_bytes;
+    counts->front_entries = fronts->entries;
+    counts->front_pilot_seconds = fronts->pilot_seconds;
 }

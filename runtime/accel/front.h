@@ -1,15 +1,16 @@
 /* front.h - fronts: partially unfolded states, each with a wide tree of boxes over its items.
  *
- * A front begins with the items of one state and opens child states, largest first, until K items stand in it. What
- * stays closed is an *instance* of that state's own front. K = 1 is the cyclic graph itself, K = everything the flat scene: one
- * dial between memory and time. Paper, section 2, traces the graph; this is the modern form of its trade.
+ * A front begins with the items of one state and opens child states in place, as far as that pays. What
+ * stays closed is an *instance* of that state's own front. Nothing opened is the cyclic graph itself, everything the flat scene:
+ * one dial between memory and time. Paper, section 2, traces the graph; this is the modern form of its trade.
  *
  * Boxes and primitives are in single precision, in the front's *unit frame*: the state's box centred at the origin and
  * scaled to [-1, 1]. They only filter. A primitive that survives is evaluated along its own path in double (bvh.c), so
  * K and budget never show in a hit. A path through a front is told by *opened* nodes: each is a state that was opened,
  * with the item of its parent by which it was reached.
  *
- *     front_open.c  state -> items          front_tree.c  items -> nodes          front.c  K, budget, all fronts
+ *     front_pilot.c  rays -> visits      front_plan.c  visits, budget -> what is opened where
+ *     front_open.c   state -> items      front_tree.c  items -> nodes      front.c  all fronts
  *
  * References (pl_ref) name a node, a primitive or an instance of a front: kind in the top 4 bits, index below. */
 #ifndef PL_FRONT_H
@@ -75,7 +76,7 @@ typedef struct pl_front {
     const pl_front_instance *instances;
     const pl_opened *opened;
     const pl_ref *unbounded; /* without bounds: always visited */
-    uint32_t unbounded_count, instance_count;
+    uint32_t unbounded_count, instance_count, opened_count, node_count;
     pl_ref root;             /* PL_NOTHING: no bounded items */
     uint32_t state;
     bool framed;             /* its box is finite; else all items are unbounded */
@@ -97,53 +98,132 @@ static inline const pl_item *pl_front_item(const pl_states *states, const pl_fro
 
 typedef struct pl_fronts {
     pl_front *list; /* 0: the scene */
-    uint32_t count, capacity;
-    uint32_t *of_state; /* front + 1; 0: none */
-    uint64_t items, nodes, opened, instances;
+    uint32_t count;
+    uint64_t items, nodes, opened, instances, most_items; /* of all; of the largest */
     size_t bytes, node_bytes, item_bytes;
-    uint64_t limit_items; /* K; UINT64_MAX: everything */
-    bool flat;
+    uint64_t pilot_rays;
+    double entries; /* instances that a ray is expected to enter */
+    uint64_t flat_bytes, limit_items; /* limit_items: of fronts that are made by themselves */
+    double pilot_seconds;
 } pl_fronts;
 
 /* --- front_open.c --- */
 
-/* A box in the unit frame, rounded outward, and what stands in it. */
+/* A box in the unit frame, rounded outward, and what stands in it; corners are read four numbers at once. */
 typedef struct pl_boxed {
-    float lo[3], hi[3];
+    _Alignas(16) float lo[3];
     pl_ref ref;
+    _Alignas(16) float hi[3];
+    float zero;
 } pl_boxed;
 
-/* A front's items before its tree is built. */
+/* A front's items, and their boxes before its tree is built. */
 typedef struct pl_front_items {
     pl_front_primitive *primitives;
-    pl_front_instance *instances; /* .front is still the state */
+    pl_front_instance *instances;
     pl_opened *opened;
     pl_ref *unbounded;
     pl_boxed *boxes;
     size_t primitive_count, instance_count, opened_count, unbounded_count, box_count;
-    size_t primitive_capacity, instance_capacity, opened_capacity, unbounded_capacity, box_capacity;
 } pl_front_items;
 
-/* What a state's items share: made once for all fronts. */
-typedef struct pl_compositions pl_compositions;
+/* A composed map with bounds of what it does to errors (front_open.c). */
+typedef struct pl_composition {
+    pl_affine to_parent, to_object;
+    double stretch, offset, gain, base;
+} pl_composition;
+
+/* The transformations of each item composed, once for all fronts: first[state] + i is item i's. */
+struct pl_front_plan;
+typedef struct pl_compositions {
+    const pl_states *states;
+    size_t *first; /* one more than there are states */
+    pl_composition *list;
+    struct pl_front_plan *single; /* for fronts that are made by themselves; NULL: none was yet */
+} pl_compositions;
 pl_compositions *pl_compositions_create(const pl_states *states, pl_error *error);
 void pl_compositions_free(pl_compositions *compositions);
+size_t pl_compositions_bytes(const pl_compositions *compositions);
 
-/* Opens a state to at most `most` items and fills *items; front has its state, box and unit frame. */
-bool pl_front_open(const pl_compositions *compositions, const pl_front *front, uint64_t most, pl_front_items *items,
+/* Fills *items with what stands in a front, which has its state, box and unit frame. */
+bool pl_front_open(const struct pl_front_plan *plan, const pl_front *front, int threads, pl_front_items *items,
                    pl_error *error);
 void pl_front_items_free(pl_front_items *items);
 
-/* Counts only: what pl_front_open would give, and the states of the instances (appended to *closed, which grows). */
+/* --- front_pilot.c --- */
+
+/* How often a few hundred rays visited each state and entered each item (by its composition). */
+typedef struct pl_pilot {
+    double *visits, *entries;
+    uint64_t rays;
+} pl_pilot;
+bool pl_pilot_fly(pl_pilot *pilot, const pl_scene *scene, const pl_compositions *compositions, pl_error *error);
+void pl_pilot_free(pl_pilot *pilot);
+
+/* --- front_plan.c --- */
+
 typedef struct pl_front_counts {
     uint64_t primitives, instances, opened;
+    bool whole; /* nothing is left out */
 } pl_front_counts;
+
+/* A counting's working memory. */
+typedef struct pl_plan_entry {
+    uint32_t state;
+    double reached;
+} pl_plan_entry;
 typedef struct pl_state_list {
     uint32_t *list;
     size_t count, capacity;
 } pl_state_list;
-bool pl_front_count(const pl_compositions *compositions, uint32_t state, uint64_t most, pl_front_counts *counts,
-                    pl_state_list *closed, pl_error *error);
+typedef struct pl_front_counting {
+    pl_plan_entry *stack;
+    size_t capacity;
+    pl_state_list *closed; /* where not NULL, the states of instances are appended */
+} pl_front_counting;
+
+/* Which states are opened in which fronts. A state has a front if it has visits. */
+typedef struct pl_front_plan {
+    const pl_compositions *compositions;
+    uint32_t *order;      /* states, each before those that it enters */
+    uint32_t *front_of;   /* state -> front + 1; for the builder's use */
+    double *bytes;        /* of a copy of a state, less the instance that it replaces */
+    bool *price_free;     /* opened always: one item, or but one place */
+    float *probability;   /* of entering an item from its state, by composition */
+    double *visits;       /* of each front, a ray */
+    double *threshold;    /* of each front: probability a byte */
+    double estimate, entries; /* bytes; instances that a ray enters */
+    pl_front_counts *counts;  /* of each front */
+    pl_front_counting counting;
+} pl_front_plan;
+
+/* pilot may be NULL. once_is_free: what occurs once is always opened. */
+pl_front_plan *pl_front_plan_create(const pl_compositions *compositions, const pl_pilot *pilot, bool once_is_free,
+                                    pl_error *error);
+void pl_front_plan_free(pl_front_plan *plan);
+
+/* Plans fronts for so many bytes: all of them (fill), or as long as more memory pays. *fits: false if even *floor, the bytes
+ * without anything opened, is too much; the plan then is that one. */
+bool pl_front_plan_budget(pl_front_plan *plan, double budget, bool fill, double *floor, bool *fits, pl_error *error);
+
+/* What a primitive takes in a front that everything is opened in. */
+double pl_front_plan_flat_bytes(void);
+
+/* Plans fronts of at most so many items, UINT64_MAX: one of everything. */
+bool pl_front_plan_items(pl_front_plan *plan, uint64_t most, pl_error *error);
+
+/* What stands below a state that is reached with this probability in a front, itself included. false: no memory. */
+bool pl_front_plan_count(const pl_front_plan *plan, pl_front_counting *counting, uint32_t front, uint32_t state,
+                         double reached, pl_front_counts *counts);
+
+/* Plans one front of a state, with at most so many items (0: nothing is opened); its instances' fronts go by their states. */
+bool pl_front_plan_single(pl_front_plan *plan, uint32_t state, uint64_t most, pl_front_counts *counts, pl_error *error);
+
+/* Whether an instance of a state that is reached with this probability in a front is opened there. threshold NaN: never. */
+static inline bool pl_front_opens(const pl_front_plan *plan, double threshold, double reached, uint32_t state)
+{
+    return (plan->price_free[state] && threshold == threshold) || reached > threshold * plan->bytes[state];
+}
 
 /* Sets what of a front follows from its state's box and reach: the unit frame, in which the box of the bounded items is centred
  * and scaled to [-1, 1], and the slack. */
@@ -151,17 +231,20 @@ void pl_front_set_frame(pl_front *front, const pl_states *states, uint32_t state
 
 /* --- front_tree.c --- */
 
-/* Boxes (reordered) -> nodes; *root. nodes has room for pl_front_most_nodes(count). Returns their number. */
-size_t pl_front_most_nodes(size_t boxes);
-uint32_t pl_front_tree(pl_boxed *boxes, size_t count, pl_front_node *nodes, pl_ref *root, int threads);
+/* Boxes (reordered) -> nodes, to be freed by free(), and *root. The same for any number of threads. NULL: no memory. */
+pl_front_node *pl_front_tree(pl_boxed *boxes, size_t count, uint32_t *node_count, pl_ref *root, int threads);
 
 /* --- front.c --- */
 
 /* One front by itself, of a state, with at most `most` items; its instances' .front name states. sums: counts and bytes are
  * added there. Where it fails the front is to be freed as well. */
-bool pl_front_make(const pl_scene *scene, const pl_compositions *compositions, uint32_t state, uint64_t most,
-                   pl_fronts *sums, pl_front *front, pl_error *error);
+bool pl_front_make(const pl_scene *scene, pl_compositions *compositions, uint32_t state, uint64_t most, pl_fronts *sums,
+                   pl_front *front, pl_error *error);
 void pl_front_free(pl_front *front);
+
+/* Counts only; the states of its instances are appended to *closed, which grows. */
+bool pl_front_count(pl_compositions *compositions, uint32_t state, uint64_t most, pl_front_counts *counts,
+                    pl_state_list *closed, pl_error *error);
 
 bool pl_fronts_build(pl_scene *scene, pl_error *error);
 void pl_fronts_destroy(pl_scene *scene);

@@ -1,12 +1,18 @@
-/* front_open.c - from a state to the items of its front: child states are opened, the largest first (front.h).
+/* front_open.c - from a state to the items of its front, as planned (front_plan.c).
  *
  * Matrices are composed on the way down, with a bound of what composition and the normative chain can differ by:
  * a chain of maps x' = N·x + τ with stretches ν sends |x| to at most ν|x| + T, and rounds by at most
  * ε·(gain·|x| + base). Appending a second such chain to a first gives
  *
- *     T = ν2·T1 + T2    gain = ν2·gain1 + gain2·ν1    base = ν2·base1 + gain2·T1 + base2    ν = ν2·ν1 */
+ *     T = ν2·T1 + T2    gain = ν2·gain1 + gain2·ν1    base = ν2·base1 + gain2·T1 + base2    ν = ν2·ν1
+ *
+ * The plan has counted a front's items, so they go straight to where they stay. Large fronts are opened by several threads:
+ * from the state down until there are enough places to go on from, whose items are counted again to know where
+ * each place's begin. So the order of items doesn't depend on the threads. */
 #include "front.h"
 
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,35 +21,28 @@
 /* Roundings of one map, and as many for its composition. */
 #define ROUNDINGS 32.0
 
-typedef struct chain {
-    pl_affine to_parent, to_object;
-    double stretch, offset, gain, base;
-} chain;
+enum { PARALLEL_ITEMS = 1 << 14, PLACES = 64, MOST_THREADS = 64 };
 
-struct pl_compositions {
-    const pl_states *states;
-    size_t *first; /* of each state, in chains */
-    chain *chains; /* of each item */
-};
+typedef pl_composition chain;
 
-/* A state that may still be opened, or becomes an instance. */
-typedef struct closed {
+/* A state that is to be opened. */
+typedef struct place {
     chain at;
-    const pl_item *item;
-    double area;
-    uint32_t opened;
+    const pl_item *item; /* that leads to it; NULL: the front's own state */
+    double reached;
+    uint32_t parent;     /* opened */
     bool no_shadow;
-} closed;
+} place;
 
+/* Opening from one place on: where its items go. */
 typedef struct opening {
-    const pl_compositions *compositions;
+    const pl_front_plan *plan;
     const pl_front *front;
-    pl_front_items *items; /* NULL: only counted */
-    pl_front_counts counts;
-    closed *heap; /* the largest area first */
-    size_t heap_count, heap_capacity;
-    bool ordered; /* by area; else last in, first out */
-    pl_error *error;
+    pl_front_items *items;
+    size_t primitive, instance, opened; /* the next of each */
+    place *stack;
+    size_t count, capacity;
+    bool odd; /* has items that are in no box */
 } opening;
 
 static chain chain_identity(void)
@@ -79,9 +78,9 @@ pl_compositions *pl_compositions_create(const pl_states *states, pl_error *error
     if (made) {
         made->states = states;
         made->first = malloc((states->count + 1) * sizeof *made->first);
-        made->chains = malloc((total + 1) * sizeof *made->chains);
+        made->list = malloc((total + 1) * sizeof *made->list);
     }
-    if (!made || !made->first || !made->chains) {
+    if (!made || !made->first || !made->list) {
         pl_compositions_free(made);
         pl_fail_memory(error, "building the fronts");
         return NULL;
@@ -92,7 +91,7 @@ pl_compositions *pl_compositions_create(const pl_states *states, pl_error *error
         made->first[i] = total;
         for (uint32_t k = 0; k < state->item_count; k++) {
             const pl_item *item = &state->items[k];
-            chain *whole = &made->chains[total++];
+            chain *whole = &made->list[total++];
             *whole = item->transform_count ? chain_of(item->transforms[0]) : chain_identity();
             for (uint32_t t = 1; t < item->transform_count; t++) {
                 chain next = chain_of(item->transforms[t]);
@@ -100,70 +99,23 @@ pl_compositions *pl_compositions_create(const pl_states *states, pl_error *error
             }
         }
     }
+    made->first[states->count] = total;
     return made;
+}
+
+size_t pl_compositions_bytes(const pl_compositions *compositions)
+{
+    const size_t states = compositions->states->count;
+    return compositions->first[states] * sizeof *compositions->list + (states + 1) * sizeof *compositions->first;
 }
 
 void pl_compositions_free(pl_compositions *compositions)
 {
     if (!compositions) return;
     free(compositions->first);
-    free(compositions->chains);
+    free(compositions->list);
+    pl_front_plan_free(compositions->single);
     free(compositions);
-}
-
-/* --- growing arrays --- */
-
-/* Makes room for one more element; false: no memory. */
-static bool grow(void *array, size_t count, size_t *capacity, size_t element)
-{
-    if (count < *capacity) return true;
-    size_t more = *capacity ? 2 * *capacity : 64;
-    void **place = array, *data = realloc(*place, more * element);
-    if (!data) return false;
-    *place = data;
-    *capacity = more;
-    return true;
-}
-
-void pl_front_items_free(pl_front_items *items)
-{
-    free(items->primitives);
-    free(items->instances);
-    free(items->opened);
-    free(items->unbounded);
-    free(items->boxes);
-    memset(items, 0, sizeof *items);
-}
-
-/* --- the heap of closed states --- */
-
-static bool push(opening *o, const closed *c)
-{
-    if (!grow(&o->heap, o->heap_count, &o->heap_capacity, sizeof *o->heap)) return false;
-    size_t at = o->heap_count++;
-    while (o->ordered && at > 0 && o->heap[(at - 1) / 2].area < c->area) {
-        o->heap[at] = o->heap[(at - 1) / 2];
-        at = (at - 1) / 2;
-    }
-    o->heap[at] = *c;
-    return true;
-}
-
-static closed pop(opening *o)
-{
-    closed top = o->heap[o->ordered ? 0 : o->heap_count - 1], last = o->heap[--o->heap_count];
-    if (!o->ordered || o->heap_count == 0) return top;
-    size_t at = 0;
-    for (;;) {
-        size_t child = 2 * at + 1;
-        if (child >= o->heap_count) break;
-        if (child + 1 < o->heap_count && o->heap[child + 1].area > o->heap[child].area) child++;
-        if (o->heap[child].area <= last.area) break;
-        o->heap[at] = o->heap[child];
-        at = child;
-    }
-    o->heap[at] = last;
-    return top;
 }
 
 /* --- items --- */
@@ -216,43 +168,31 @@ void pl_front_set_frame(pl_front *front, const pl_states *states, uint32_t state
                               (2.0 * (reach->gain * away + reach->base) + 16.0 * (away + reach->size)));
 }
 
-/* Lists an item under its box in the front's own frame, or as unbounded. Empty boxes hold nothing to hit. */
-static bool list_item(opening *o, const pl_box *box, bool unbounded, pl_ref ref)
+/* An item's box in the front's unit frame. What has none, or everything, is told by one that isn't in order: empty or NaN. */
+static void set_box(opening *o, size_t index, const pl_box *box, bool unbounded, pl_ref ref)
 {
-    pl_front_items *items = o->items;
-    bool empty = box->lo[0] > box->hi[0]; /* which NaN isn't */
-    if (unbounded || !(empty || (pl_box_is_finite(box) && o->front->framed))) {
-        if (!grow(&items->unbounded, items->unbounded_count, &items->unbounded_capacity, sizeof *items->unbounded))
-            return false;
-        items->unbounded[items->unbounded_count++] = ref;
-        return true;
-    }
-    if (empty) return true;
-    if (!grow(&items->boxes, items->box_count, &items->box_capacity, sizeof *items->boxes)) return false;
-    pl_boxed *boxed = &items->boxes[items->box_count++];
+    pl_boxed *boxed = &o->items->boxes[index];
+    boxed->ref = ref;
+    boxed->zero = 0.0f;
     for (int axis = 0; axis < 3; axis++) {
         boxed->lo[axis] = round_down((box->lo[axis] - o->front->centre[axis]) * o->front->scale);
         boxed->hi[axis] = round_up((box->hi[axis] - o->front->centre[axis]) * o->front->scale);
     }
-    boxed->ref = ref;
-    return true;
+    const bool empty = box->lo[0] > box->hi[0]; /* which NaN isn't */
+    if (unbounded || !(empty || (pl_box_is_finite(box) && o->front->framed))) boxed->lo[0] = NAN;
+    o->odd = o->odd || !(boxed->lo[0] <= boxed->hi[0]);
 }
 
-static bool add_primitive(opening *o, const chain *at, const pl_item *item, uint32_t opened, uint32_t index,
-                          bool no_shadow)
+static void add_primitive(opening *o, const chain *at, const pl_item *item, uint32_t index, bool no_shadow)
 {
-    pl_front_items *items = o->items;
-    const pl_states *states = o->compositions->states;
-    o->counts.primitives++;
-    if (!items) return true;
-    if (!grow(&items->primitives, items->primitive_count, &items->primitive_capacity, sizeof *items->primitives))
-        return false;
+    const pl_states *states = o->plan->compositions->states;
+    const size_t place = o->primitive++;
     const double *m = at->to_object.m, *centre = o->front->centre;
-    pl_front_primitive *p = &items->primitives[items->primitive_count];
-    double square = 0.0;
+    pl_front_primitive *p = &o->items->primitives[place];
+    double square = 0.0, size = 1.0 / o->front->scale;
     for (int r = 0; r < 3; r++) {
         for (int c = 0; c < 3; c++) {
-            double x = m[4 * r + c] / o->front->scale;
+            double x = m[4 * r + c] * size;
             square += x * x;
             p->columns[3 * c + r] = (float)x;
         }
@@ -261,14 +201,14 @@ static bool add_primitive(opening *o, const chain *at, const pl_item *item, uint
     }
     p->stretch = round_up(sqrt(square) * (1.0 + 0x1p-20));
     p->argument = (float)item->arguments[0];
-    p->opened = opened;
+    p->opened = (uint32_t)o->opened - 1;
     p->item = index | (no_shadow ? PL_NO_SHADOW : 0);
-    bool mesh = item->kind == PL_NODE_MESH;
+    const bool mesh = item->kind == PL_NODE_MESH;
     const pl_shape *shape = mesh ? NULL : pl_shape_of(item->what);
-    pl_box box = mesh ? pl_box_map(&at->to_parent, pl_mesh_box(states->meshes[item->what]))
-                      : pl_shape_box(shape, item->arguments, at->to_parent.m);
-    uint32_t kind = mesh ? PL_KIND_MESH : item->what;
-    return list_item(o, &box, !mesh && !shape->support, pl_ref_of(kind, (uint32_t)items->primitive_count++));
+    const pl_box box = mesh ? pl_box_map(&at->to_parent, pl_mesh_box(states->meshes[item->what]))
+                            : pl_shape_box(shape, item->arguments, at->to_parent.m);
+    const uint32_t kind = mesh ? PL_KIND_MESH : item->what;
+    set_box(o, place, &box, !mesh && !shape->support, pl_ref_of(kind, (uint32_t)place));
 }
 
 /* The map from a front's unit frame to that of an instance in it, and its bounds (front.h). Beyond what chain bounds: the
@@ -292,118 +232,194 @@ static void set_instance_map(pl_front_instance *it, const pl_front *outer, const
     }
 }
 
-static bool add_instance(opening *o, const closed *c)
+static void add_instance(opening *o, const chain *at, const pl_item *item, uint32_t index, bool no_shadow)
 {
-    pl_front_items *items = o->items;
-    const pl_states *states = o->compositions->states;
-    const pl_state *state = &states->list[c->item->what];
-    if (!grow(&items->instances, items->instance_count, &items->instance_capacity, sizeof *items->instances))
-        return false;
-    const pl_item *by = items->opened[c->opened].item;
-    pl_front_instance *it = &items->instances[items->instance_count];
+    const pl_states *states = o->plan->compositions->states;
+    const size_t place = o->instance++;
+    pl_front_instance *it = &o->items->instances[place];
     pl_front inner = {0};
     *it = (pl_front_instance){
-        .front = c->item->what,
-        .opened = c->opened,
-        .item = (uint32_t)(c->item - states->list[by ? by->what : o->front->state].items) | (c->no_shadow ? PL_NO_SHADOW : 0),
+        .front = o->plan->front_of[item->what] - 1,
+        .opened = (uint32_t)o->opened - 1,
+        .item = index | (no_shadow ? PL_NO_SHADOW : 0),
     };
-    pl_front_set_frame(&inner, states, it->front);
-    set_instance_map(it, o->front, &inner, &c->at);
+    pl_front_set_frame(&inner, states, item->what);
+    set_instance_map(it, o->front, &inner, at);
     /* Where there are cut-offs the whole box may be drawn (cut.h). */
-    pl_box box = states->cuts ? pl_box_map(&c->at.to_parent, &state->box) : pl_box_under(states, c->item, &c->at.to_parent);
-    return list_item(o, &box, state->unbounded, pl_ref_of(PL_KIND_INSTANCE, (uint32_t)items->instance_count++));
+    const pl_box box = states->cuts ? pl_box_map(&at->to_parent, &states->list[item->what].box)
+                                    : pl_box_under(states, item, &at->to_parent);
+    set_box(o, o->items->primitive_count + place, &box, states->list[item->what].unbounded,
+            pl_ref_of(PL_KIND_INSTANCE, (uint32_t)place));
 }
 
-/* Lists what a state consists of: primitives at once, states on the heap. */
-static bool open_state(opening *o, const closed *c, uint32_t state)
+static place *push(opening *o)
 {
-    const pl_compositions *made = o->compositions;
-    const pl_states *states = made->states;
-    const pl_state *it = &states->list[state];
-    uint32_t opened = (uint32_t)o->counts.opened++;
-    if (o->items) {
-        pl_front_items *items = o->items;
-        if (!grow(&items->opened, items->opened_count, &items->opened_capacity, sizeof *items->opened)) return false;
-        uint32_t moved = !c->item ? 0 : c->item->transform_count ? opened : items->opened[c->opened].moved;
-        items->opened[items->opened_count++] = (pl_opened){c->item, c->opened, moved};
+    if (o->count == o->capacity) {
+        size_t more = 2 * o->capacity + 64;
+        place *stack = realloc(o->stack, more * sizeof *stack);
+        if (!stack) return NULL;
+        o->stack = stack;
+        o->capacity = more;
     }
-    for (uint32_t i = 0; i < it->item_count; i++) {
+    return &o->stack[o->count++];
+}
+
+/* Lists what a state consists of: primitives and instances at once, what is to be opened on the stack, the first on
+ * top. */
+static bool open_state(opening *o, const place *from)
+{
+    const pl_compositions *made = o->plan->compositions;
+    const pl_states *states = made->states;
+    const uint32_t state = from->item ? from->item->what : o->front->state, opened = (uint32_t)o->opened++;
+    const pl_state *it = &states->list[state];
+    pl_opened *list = o->items->opened;
+    const uint32_t moved = !from->item ? 0 : from->item->transform_count ? opened : list[from->parent].moved;
+    list[opened] = (pl_opened){from->item, from->parent, moved};
+    for (uint32_t i = it->item_count; i-- > 0;) {
         const pl_item *item = &it->items[i];
+        const size_t composition = made->first[state] + i;
         if (pl_item_primitives(states, item) == 0) continue;
-        closed next = {.at = c->at, .item = item, .opened = opened};
-        next.no_shadow = c->no_shadow || item->no_shadow;
-        chain_append(&next.at, &made->chains[made->first[state] + i]);
-        if (item->kind != PL_NODE_ENTER) {
-            if (!add_primitive(o, &next.at, item, opened, i, next.no_shadow)) return false;
+        const bool no_shadow = from->no_shadow || item->no_shadow;
+        const double reached = from->reached * (double)o->plan->probability[composition];
+        if (item->kind == PL_NODE_ENTER && pl_front_opens(o->plan, o->plan->threshold[o->front->state], reached, item->what)) {
+            place *next = push(o);
+            if (!next) return false;
+            *next = (place){from->at, item, reached, opened, no_shadow};
+            chain_append(&next->at, &made->list[composition]);
             continue;
         }
-        if (o->ordered) {
-            pl_box box = pl_box_map(&next.at.to_parent, &states->list[item->what].box);
-            next.area = states->list[item->what].unbounded ? INFINITY : pl_box_area(&box);
-        }
-        if (!push(o, &next)) return false;
+        chain at = from->at;
+        chain_append(&at, &made->list[composition]);
+        if (item->kind == PL_NODE_ENTER) add_instance(o, &at, item, i, no_shadow);
+        else add_primitive(o, &at, item, i, no_shadow);
     }
     return true;
 }
 
-/* Items with anything to hit: what opening a state adds in place of it. */
-static uint32_t live_items(const pl_states *states, const pl_state *state)
+/* Opens what stands on the stack, and what comes of it. */
+static bool open_all(opening *o)
 {
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < state->item_count; i++) count += pl_item_primitives(states, &state->items[i]) > 0;
-    return count;
+    while (o->count) {
+        const place next = o->stack[--o->count];
+        if (!open_state(o, &next)) return false;
+    }
+    return true;
 }
 
-/* Opens as long as at most `most` items result; the rest stays on the heap. A state with one item costs nothing, but
- * there may be no end of them. most = 0: nothing is opened. */
-static bool open_all(opening *o, uint32_t state, uint64_t most)
+/* --- several threads --- */
+
+typedef struct task {
+    opening *openings;
+    int number;
+    atomic_int next;
+    atomic_bool failed;
+} task;
+
+static void *work(void *context)
 {
-    const pl_states *states = o->compositions->states;
-    closed root = {.at = chain_identity()};
-    o->ordered = most != UINT64_MAX;
-    if (!open_state(o, &root, state)) return false;
-    size_t kept = 0; /* closed for good */
-    closed *rest = NULL;
-    size_t rest_capacity = 0;
+    task *t = context;
+    for (int i; (i = atomic_fetch_add(&t->next, 1)) < t->number;)
+        if (!open_all(&t->openings[i])) atomic_store(&t->failed, true);
+    return NULL;
+}
+
+/* Takes the places on o's stack apart. */
+static bool open_parallel(opening *o, int threads, pl_front_counting *counting)
+{
+    opening openings[2 * PLACES];
+    pthread_t started[MOST_THREADS];
+    task t = {.openings = openings};
+    int others = 0;
     bool ok = true;
-    while (ok && o->heap_count) {
-        closed c = pop(o);
-        uint64_t adds = live_items(states, &states->list[c.item->what]);
-        uint64_t now = o->counts.primitives + o->heap_count + kept;
-        if (now + adds <= most || (adds <= 1 && most > 0 && !states->list[c.item->what].endless)) {
-            ok = open_state(o, &c, c.item->what);
-        } else {
-            ok = grow(&rest, kept, &rest_capacity, sizeof *rest);
-            if (ok) rest[kept++] = c;
-        }
+    for (size_t i = 0; i < o->count && ok; i++, t.number++) {
+        pl_front_counts counts;
+        const place *from = &o->stack[i];
+        openings[i] = (opening){.plan = o->plan, .front = o->front, .items = o->items,
+                                .primitive = o->primitive, .instance = o->instance, .opened = o->opened};
+        place *own = push(&openings[i]);
+        ok = own && pl_front_plan_count(o->plan, counting, o->front->state, from->item->what, from->reached, &counts);
+        if (!ok) continue;
+        *own = *from;
+        o->primitive += counts.primitives;
+        o->instance += counts.instances;
+        o->opened += counts.opened;
     }
-    o->counts.instances = kept;
-    free(o->heap);
-    o->heap = rest;
-    o->heap_count = kept;
-    return ok;
+    if (threads > MOST_THREADS) threads = MOST_THREADS;
+    while (ok && others < threads - 1 && pthread_create(&started[others], NULL, work, &t) == 0) others++;
+    if (ok) work(&t);
+    for (int i = 0; i < others; i++) pthread_join(started[i], NULL);
+    for (int i = 0; i < t.number; i++) {
+        o->odd = o->odd || openings[i].odd;
+        free(openings[i].stack);
+    }
+    o->count = 0;
+    return ok && !atomic_load(&t.failed);
 }
 
-bool pl_front_open(const pl_compositions *compositions, const pl_front *front, uint64_t most, pl_front_items *items,
-                   pl_error *error)
+/* Opens breadth first until there are PLACES on the stack; a state that has more children than that is left. */
+static bool open_widely(opening *o)
 {
-    opening o = {.compositions = compositions, .front = front, .items = items, .error = error};
-    bool ok = open_all(&o, front->state, most);
-    for (size_t i = 0; ok && i < o.heap_count; i++) ok = add_instance(&o, &o.heap[i]);
-    free(o.heap);
+    while (o->count && o->count < PLACES) {
+        const place next = o->stack[0];
+        memmove(o->stack, o->stack + 1, --o->count * sizeof *o->stack);
+        if (!open_state(o, &next)) return false;
+    }
+    return true;
+}
+
+/* Moves what is in no box out of the boxes: empty ones hold nothing to hit, the others are always visited. */
+static bool sort_out(pl_front_items *items)
+{
+    size_t unbounded = 0, kept = 0;
+    for (size_t i = 0; i < items->box_count; i++) unbounded += isnan(items->boxes[i].lo[0]);
+    if (!(items->unbounded = malloc((unbounded + 1) * sizeof *items->unbounded))) return false;
+    for (size_t i = 0; i < items->box_count; i++) {
+        const pl_boxed *box = &items->boxes[i];
+        if (isnan(box->lo[0])) items->unbounded[items->unbounded_count++] = box->ref;
+        else if (box->lo[0] <= box->hi[0]) items->boxes[kept++] = *box;
+    }
+    items->box_count = kept;
+    return true;
+}
+
+static void *allocate(size_t count, size_t element)
+{
+    return aligned_alloc(64, (count * element + 64) & ~(size_t)63);
+}
+
+bool pl_front_open(const pl_front_plan *plan, const pl_front *front, int threads, pl_front_items *items, pl_error *error)
+{
+    const pl_front_counts *counts = &plan->counts[front->state];
+    *items = (pl_front_items){.primitive_count = counts->primitives,
+                              .instance_count = counts->instances,
+                              .opened_count = counts->opened,
+                              .box_count = counts->primitives + counts->instances};
+    items->primitives = allocate(items->primitive_count, sizeof *items->primitives);
+    items->instances = allocate(items->instance_count, sizeof *items->instances);
+    items->opened = allocate(items->opened_count, sizeof *items->opened);
+    items->boxes = allocate(items->box_count, sizeof *items->boxes);
+    bool ok = items->primitives && items->instances && items->opened && items->boxes;
+    opening o = {.plan = plan, .front = front, .items = items};
+    place *root = ok ? push(&o) : NULL;
+    if (root) *root = (place){.at = chain_identity(), .reached = 1.0};
+    ok = root != NULL;
+    if (ok && items->box_count >= PARALLEL_ITEMS) {
+        pl_front_counting counting = {0};
+        ok = open_widely(&o) && (o.count > 2 * PLACES || open_parallel(&o, threads, &counting));
+        free(counting.stack);
+    }
+    ok = ok && open_all(&o);
+    free(o.stack);
+    if (ok && o.odd) ok = sort_out(items);
     return ok || pl_fail_memory(error, "building the fronts");
 }
 
-bool pl_front_count(const pl_compositions *compositions, uint32_t state, uint64_t most, pl_front_counts *counts,
-                    pl_state_list *closed_states, pl_error *error)
+void pl_front_items_free(pl_front_items *items)
 {
-    opening o = {.compositions = compositions, .error = error};
-    bool ok = open_all(&o, state, most);
-    for (size_t i = 0; ok && i < o.heap_count; i++) {
-        ok = grow(&closed_states->list, closed_states->count, &closed_states->capacity, sizeof *closed_states->list);
-        if (ok) closed_states->list[closed_states->count++] = o.heap[i].item->what;
-    }
-    *counts = o.counts;
-    free(o.heap);
-    return ok || pl_fail_memory(error, "building the fronts");
+    free(items->primitives);
+    free(items->instances);
+    free(items->opened);
+    free(items->unbounded);
+    free(items->boxes);
+    memset(items, 0, sizeof *items);
 }

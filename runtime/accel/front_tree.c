@@ -1,20 +1,60 @@
-/* front_tree.c - a wide tree over a front's boxes: binned surface area heuristic, top down, eight children a node.
+/* front_tree.c - a wide tree over a front's boxes, top down by the surface area heuristic.
  *
- * Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007). Groups are divided in two, the one with
- * the largest area first, until there are eight. Large groups are binned along the axis on which their centres spread
- * most, small ones along all three. */
+ * Groups of boxes are divided in two by binned areas (Wald, "On fast construction of SAH-based bounding volume hierarchies",
+ * 2007). A large group becomes a node of eight by dividing the largest of its parts again and again. A group of at most
+ * BLOCK boxes is divided down to single ones, and this binary tree is collapsed into the wide one of the least total area
+ * (Ylitie, Karras & Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", 2017, section 3.2):
+ *
+ *     cost(t, 1)     = price + area(t) + best(t, 8)                 t as one node            (0: a single box)
+ *     best(t, slots) = min over k of cost(left, k) + cost(right, slots - k)
+ *     cost(t, slots) = min(best(t, slots), cost(t, slots - 1))      t as at most so many children
+ *
+ * Groups of many boxes are parts that any thread takes; nodes are numbered when all are done, so threads don't show. */
+#include <math.h>
 #include <pthread.h>
-#include <stdatomic.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "front.h"
 
-enum { BINS = 16, DEEP = 64, ALL_AXES = 2048, PARALLEL = 1 << 15, MOST_THREADS = 64 };
+enum { BINS = 16, DEEP = 64, ALL_AXES = 4096, BLOCK = 512, FEW = 8, PART = 1 << 13, TOPS = 1024, MOST_THREADS = 64 };
+
+
+/* What a node's memory costs, in average areas of the boxes that it is built over: fuller nodes, at most 2 % more visits. */
+#define MEMORY_PRICE 6.0f
+
+/* Four numbers at once, of which the fourth means nothing. */
+typedef float four __attribute__((vector_size(16)));
+typedef int32_t four_ints __attribute__((vector_size(16)));
+
+#ifdef __SSE2__
+#include <emmintrin.h>
+static inline four least(four a, four b)
+{
+    return (four)_mm_min_ps((__m128)a, (__m128)b);
+}
+
+static inline four most(four a, four b)
+{
+    return (four)_mm_max_ps((__m128)a, (__m128)b);
+}
+#else
+static inline four least(four a, four b)
+{
+    four_ints less = a < b;
+    return (four)(((four_ints)a & less) | ((four_ints)b & ~less));
+}
+
+static inline four most(four a, four b)
+{
+    four_ints more = a > b;
+    return (four)(((four_ints)a & more) | ((four_ints)b & ~more));
+}
+#endif
 
 typedef struct bounds {
-    float lo[3], hi[3];
+    four lo, hi;
 } bounds;
 
 typedef struct group {
@@ -23,232 +63,526 @@ typedef struct group {
     bounds box, centres; /* centres: lo + hi of the boxes */
 } group;
 
-typedef struct building {
-    pl_front_node *nodes;
-    uint32_t count;
-} building;
+#define NOTHING ((bounds){{INFINITY, INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY, -INFINITY}})
 
-static const bounds nothing = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-
-static inline void join(bounds *b, const float lo[3], const float hi[3])
+/* Without the reference that stands in the fourth number, which as a number may be slow to compute with. */
+static inline bounds bounds_of(const pl_boxed *box)
 {
-    for (int axis = 0; axis < 3; axis++) {
-        b->lo[axis] = lo[axis] < b->lo[axis] ? lo[axis] : b->lo[axis];
-        b->hi[axis] = hi[axis] > b->hi[axis] ? hi[axis] : b->hi[axis];
-    }
+    const four_ints three = {-1, -1, -1, 0};
+    four lo, hi;
+    memcpy(&lo, box->lo, sizeof lo);
+    memcpy(&hi, box->hi, sizeof hi);
+    return (bounds){(four)((four_ints)lo & three), hi};
+}
+
+static inline void join(bounds *b, bounds other)
+{
+    b->lo = least(b->lo, other.lo);
+    b->hi = most(b->hi, other.hi);
 }
 
 static inline float area(const bounds *b)
 {
-    float x = b->hi[0] - b->lo[0], y = b->hi[1] - b->lo[1], z = b->hi[2] - b->lo[2];
-    return x >= 0.0f ? x * y + y * z + z * x : 0.0f;
+    four size = b->hi - b->lo;
+    return size[0] >= 0.0f ? size[0] * size[1] + size[1] * size[2] + size[2] * size[0] : 0.0f;
+}
+
+static inline void add(group *g, bounds box)
+{
+    const four centre = box.lo + box.hi;
+    join(&g->box, box);
+    join(&g->centres, (bounds){centre, centre});
 }
 
 static group group_of(pl_boxed *boxes, size_t count)
 {
-    group g = {boxes, count, nothing, nothing};
-    for (size_t i = 0; i < count; i++) {
-        float centre[3];
-        for (int axis = 0; axis < 3; axis++) centre[axis] = boxes[i].lo[axis] + boxes[i].hi[axis];
-        join(&g.box, boxes[i].lo, boxes[i].hi);
-        join(&g.centres, centre, centre);
-    }
+    group g = {boxes, count, NOTHING, NOTHING};
+    for (size_t i = 0; i < count; i++) add(&g, bounds_of(&boxes[i]));
     return g;
 }
 
-static inline int bin_of(const pl_boxed *box, int axis, float lo, float scale)
-{
-    int bin = (int)((box->lo[axis] + box->hi[axis] - lo) * scale);
-    return bin < 0 ? 0 : bin >= BINS ? BINS - 1 : bin;
-}
+/* --- dividing a group --- */
 
 typedef struct plane {
     int axis, bin; /* bins below `bin` go left */
-    float cost, lo, scale;
+    float cost;
 } plane;
 
-static void try_axis(const group *g, int axis, plane *best)
+typedef struct binning {
+    four lo, scale; /* bin: (centre - lo) * scale */
+} binning;
+
+static inline four_ints bins_of(const binning *b, bounds box)
 {
-    bounds boxes[BINS], left = nothing, right = nothing;
-    size_t counts[BINS] = {0}, before = 0;
+    const four at = (box.lo + box.hi - b->lo) * b->scale;
+    return __builtin_convertvector(least(most(at, (four){0}), (four){BINS - 1, BINS - 1, BINS - 1, BINS - 1}), four_ints);
+}
+
+static void sweep(const bounds boxes[BINS], const uint32_t counts[BINS], size_t count, int axis, plane *best)
+{
     float right_area[BINS];
-    float lo = g->centres.lo[axis], scale = BINS / (g->centres.hi[axis] - lo);
-    if (!(scale < INFINITY)) return;
-    for (int i = 0; i < BINS; i++) boxes[i] = nothing;
-    for (size_t i = 0; i < g->count; i++) {
-        int bin = bin_of(&g->boxes[i], axis, lo, scale);
-        counts[bin]++;
-        join(&boxes[bin], g->boxes[i].lo, g->boxes[i].hi);
-    }
+    bounds left = NOTHING, right = NOTHING;
+    size_t before = 0;
     for (int i = BINS - 1; i > 0; i--) {
-        join(&right, boxes[i].lo, boxes[i].hi);
+        join(&right, boxes[i]);
         right_area[i] = area(&right);
     }
     for (int i = 1; i < BINS; i++) {
-        join(&left, boxes[i - 1].lo, boxes[i - 1].hi);
+        join(&left, boxes[i - 1]);
         before += counts[i - 1];
-        float cost = area(&left) * (float)before + right_area[i] * (float)(g->count - before);
-        if (before > 0 && before < g->count && cost < best->cost) *best = (plane){axis, i, cost, lo, scale};
+        const float cost = area(&left) * (float)before + right_area[i] * (float)(count - before);
+        if (before > 0 && before < count && cost < best->cost) *best = (plane){axis, i, cost};
     }
 }
 
 static int widest(const bounds *b)
 {
-    float x = b->hi[0] - b->lo[0], y = b->hi[1] - b->lo[1], z = b->hi[2] - b->lo[2];
-    return x >= y && x >= z ? 0 : y >= z ? 1 : 2;
+    four size = b->hi - b->lo;
+    return size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
 }
 
-/* Reorders a group and returns how many stand in its left part: the cheapest plane, or half of them where no plane divides
- * or the tree has become deep. */
-static size_t divide(const group *g, int level)
+/* The cheapest plane; cost INFINITY: none divides. */
+static plane find_plane(const group *g, const binning *b)
 {
+    const int only = g->count > ALL_AXES ? widest(&g->centres) : -1;
+    bounds boxes[3][BINS];
+    uint32_t counts[3][BINS] = {{0}};
     plane best = {.cost = INFINITY};
-    if (level > DEEP) return g->count / 2;
-    if (g->count > ALL_AXES) try_axis(g, widest(&g->centres), &best);
-    else
-        for (int axis = 0; axis < 3; axis++) try_axis(g, axis, &best);
-    if (best.cost == INFINITY) return g->count / 2;
-    size_t left = 0, right = g->count;
-    for (;;) {
-        while (left < right && bin_of(&g->boxes[left], best.axis, best.lo, best.scale) < best.bin) left++;
-        while (left < right && bin_of(&g->boxes[right - 1], best.axis, best.lo, best.scale) >= best.bin) right--;
-        if (left >= right) return left;
-        pl_boxed swap = g->boxes[left];
-        g->boxes[left++] = g->boxes[--right];
-        g->boxes[right] = swap;
+    for (int axis = 0; axis < 3; axis++)
+        for (int i = 0; i < BINS; i++) boxes[axis][i] = NOTHING;
+    for (size_t i = 0; i < g->count; i++) {
+        const bounds box = bounds_of(&g->boxes[i]);
+        const four_ints bins = bins_of(b, box);
+        if (only >= 0) {
+            counts[only][bins[only]]++;
+            join(&boxes[only][bins[only]], box);
+            continue;
+        }
+#pragma GCC unroll 3
+        for (int axis = 0; axis < 3; axis++) {
+            counts[axis][bins[axis]]++;
+            join(&boxes[axis][bins[axis]], box);
+        }
+    }
+    for (int axis = 0; axis < 3; axis++)
+        if (only < 0 || axis == only) sweep(boxes[axis], counts[axis], g->count, axis, &best);
+    return best;
+}
+
+static void halve(const group *g, group *left, group *right)
+{
+    const size_t half = g->count / 2;
+    *left = group_of(g->boxes, half);
+    *right = group_of(g->boxes + half, g->count - half);
+}
+
+/* A few boxes: sorted by their centres along the axis on which these spread most, and divided where it costs least. */
+static void divide_few(const group *g, group *left, group *right)
+{
+    const int axis = widest(&g->centres);
+    float right_area[FEW + 1], cost = INFINITY;
+    pl_boxed *boxes = g->boxes;
+    bounds side = NOTHING;
+    size_t best = 1;
+    for (size_t i = 1; i < g->count; i++) {
+        const pl_boxed moved = boxes[i];
+        const float centre = moved.lo[axis] + moved.hi[axis];
+        size_t place = i;
+        for (; place > 0 && boxes[place - 1].lo[axis] + boxes[place - 1].hi[axis] > centre; place--)
+            boxes[place] = boxes[place - 1];
+        boxes[place] = moved;
+    }
+    for (size_t i = g->count - 1; i > 0; i--) {
+        join(&side, bounds_of(&boxes[i]));
+        right_area[i] = area(&side);
+    }
+    side = NOTHING;
+    for (size_t i = 1; i < g->count; i++) {
+        join(&side, bounds_of(&boxes[i - 1]));
+        const float here = area(&side) * (float)i + right_area[i] * (float)(g->count - i);
+        if (here < cost) {
+            cost = here;
+            best = i;
+        }
+    }
+    *left = group_of(boxes, best);
+    *right = group_of(boxes + best, g->count - best);
+}
+
+/* Reorders a group and gives its two parts: by the cheapest plane, or halves where none divides or the tree has become deep. */
+static void divide(const group *g, int level, group *left, group *right)
+{
+    if (level > DEEP) {
+        halve(g, left, right);
+        return;
+    }
+    if (g->count <= FEW) {
+        divide_few(g, left, right);
+        return;
+    }
+    const four size = g->centres.hi - g->centres.lo;
+    binning b = {g->centres.lo, {0}};
+    for (int axis = 0; axis < 3; axis++) {
+        const float scale = BINS / size[axis];
+        b.scale[axis] = scale < INFINITY ? scale : 0.0f;
+    }
+    const plane at = find_plane(g, &b);
+    if (at.cost == INFINITY) {
+        halve(g, left, right);
+        return;
+    }
+    size_t l = 0, r = g->count;
+    *left = (group){g->boxes, 0, NOTHING, NOTHING};
+    *right = *left;
+    while (l < r) {
+        const bounds box = bounds_of(&g->boxes[l]);
+        if (bins_of(&b, box)[at.axis] < at.bin) {
+            add(left, box);
+            l++;
+            continue;
+        }
+        add(right, box);
+        const pl_boxed swap = g->boxes[l];
+        g->boxes[l] = g->boxes[--r];
+        g->boxes[r] = swap;
+    }
+    left->count = l;
+    right->boxes = g->boxes + l;
+    right->count = g->count - l;
+}
+
+/* --- small groups: a binary tree, collapsed --- */
+
+typedef struct binary {
+    bounds box;
+    float cost[PL_FRONT_WIDTH];            /* as at most 1 … 7 children */
+    uint8_t left_slots[PL_FRONT_WIDTH + 1]; /* of so many slots; 0: with fewer slots it is no worse */
+    uint32_t left, right;
+    pl_ref ref; /* of a single box; else PL_NOTHING */
+} binary;
+
+typedef struct building {
+    pl_front_node *nodes;
+    uint32_t count;
+    binary *binary; /* 2 * BLOCK */
+    uint32_t binary_count;
+    float price; /* of a node's memory, as an area */
+} building;
+
+/* Costs of a binary node from those of its children. */
+static void find_costs(binary *t, const binary *left, const binary *right, float price)
+{
+    for (int slots = 2; slots <= PL_FRONT_WIDTH; slots++) {
+        float best = INFINITY;
+        int best_left = 1;
+        for (int k = 1; k < slots; k++) {
+            const float cost = left->cost[k] + right->cost[slots - k];
+            if (cost < best) {
+                best = cost;
+                best_left = k;
+            }
+        }
+        if (slots < PL_FRONT_WIDTH) t->cost[slots] = best;
+        else t->cost[1] = price + area(&t->box) + best;
+        t->left_slots[slots] = (uint8_t)best_left;
+    }
+    for (int slots = 2; slots < PL_FRONT_WIDTH; slots++)
+        if (t->cost[slots - 1] <= t->cost[slots]) {
+            t->cost[slots] = t->cost[slots - 1];
+            t->left_slots[slots] = 0;
+        }
+}
+
+static uint32_t make_binary(building *b, const group *g, int level)
+{
+    const uint32_t index = b->binary_count++;
+    binary *t = &b->binary[index];
+    t->box = g->box;
+    t->ref = PL_NOTHING;
+    if (g->count == 1) {
+        t->ref = g->boxes[0].ref;
+        memset(t->cost, 0, sizeof t->cost);
+        return index;
+    }
+    group left, right;
+    divide(g, level, &left, &right);
+    t->left = make_binary(b, &left, level + 1);
+    t->right = make_binary(b, &right, level + 1);
+    find_costs(t, &b->binary[t->left], &b->binary[t->right], b->price);
+    return index;
+}
+
+static pl_ref emit(building *b, uint32_t index);
+
+/* A binary node as at most so many children of a wide one, which has `number` so far. */
+static int emit_children(building *b, uint32_t index, int slots, pl_front_node *node, int number)
+{
+    const binary *t = &b->binary[index];
+    while (slots > 1 && t->ref == PL_NOTHING && t->left_slots[slots] == 0) slots--;
+    if (slots == 1 || t->ref != PL_NOTHING) {
+        for (int axis = 0; axis < 3; axis++) {
+            node->planes[axis][number] = t->box.lo[axis];
+            node->planes[3 + axis][number] = t->box.hi[axis];
+        }
+        node->child[number] = t->ref != PL_NOTHING ? t->ref : emit(b, index);
+        return number + 1;
+    }
+    number = emit_children(b, t->left, t->left_slots[slots], node, number);
+    return emit_children(b, t->right, slots - t->left_slots[slots], node, number);
+}
+
+static void clear_node(pl_front_node *node)
+{
+    for (int i = 0; i < PL_FRONT_WIDTH; i++) {
+        for (int axis = 0; axis < 3; axis++) {
+            node->planes[axis][i] = INFINITY;
+            node->planes[3 + axis][i] = -INFINITY;
+        }
+        node->child[i] = PL_NOTHING;
     }
 }
 
-/* The group with the largest area whose count is in [least, most]; -1: none. */
-static int largest_of(const group groups[], int number, size_t least, size_t most)
+static pl_ref emit(building *b, uint32_t index)
+{
+    const uint32_t place = b->count++;
+    pl_front_node *node = &b->nodes[place];
+    const binary *t = &b->binary[index];
+    clear_node(node);
+    int number = emit_children(b, t->left, t->left_slots[PL_FRONT_WIDTH], node, 0);
+    emit_children(b, t->right, PL_FRONT_WIDTH - t->left_slots[PL_FRONT_WIDTH], node, number);
+    return pl_ref_of(PL_KIND_NODE, place);
+}
+
+/* --- large groups --- */
+
+/* The group with the largest area of those that don't fit into one node; -1: none. */
+static int largest_of(const group groups[], int number)
 {
     int largest = -1;
     for (int i = 0; i < number; i++)
-        if (groups[i].count >= least && groups[i].count <= most &&
-            (largest < 0 || area(&groups[i].box) > area(&groups[largest].box)))
+        if (groups[i].count > PL_FRONT_WIDTH && (largest < 0 || area(&groups[i].box) > area(&groups[largest].box)))
             largest = i;
     return largest;
 }
 
-/* Divides a group into at most eight; returns their number. Nodes should be full: what fits into one node is divided
- * only when nothing larger is left, and then, where there is room, into single boxes. */
+/* Divides a group of more than BLOCK boxes into at most eight, in the order in which their boxes stand; returns their
+ * number. */
 static int split(const group *whole, group groups[PL_FRONT_WIDTH], int level)
 {
     int number = 1;
     groups[0] = *whole;
     while (number < PL_FRONT_WIDTH) {
-        int largest = largest_of(groups, number, PL_FRONT_WIDTH + 1, SIZE_MAX);
-        if (largest < 0) largest = largest_of(groups, number, 2, (size_t)(PL_FRONT_WIDTH - number + 1));
+        const int largest = largest_of(groups, number);
         if (largest < 0) break;
-        group g = groups[largest];
-        size_t left = divide(&g, level);
-        groups[largest] = group_of(g.boxes, left);
-        groups[number++] = group_of(g.boxes + left, g.count - left);
+        const group g = groups[largest];
+        memmove(groups + largest + 2, groups + largest + 1, (size_t)(number - largest - 1) * sizeof *groups);
+        divide(&g, level, &groups[largest], &groups[largest + 1]);
+        number++;
     }
     return number;
 }
 
 static void set_boxes(pl_front_node *node, const group groups[], int number)
 {
-    for (int i = 0; i < PL_FRONT_WIDTH; i++) {
-        const bounds *box = i < number ? &groups[i].box : &nothing;
+    clear_node(node);
+    for (int i = 0; i < number; i++)
         for (int axis = 0; axis < 3; axis++) {
-            node->planes[axis][i] = box->lo[axis];
-            node->planes[3 + axis][i] = box->hi[axis];
+            node->planes[axis][i] = groups[i].box.lo[axis];
+            node->planes[3 + axis][i] = groups[i].box.hi[axis];
         }
-        node->child[i] = PL_NOTHING;
-    }
 }
 
 /* Recursion is bounded: after DEEP levels groups are halved. */
 static pl_ref build(building *b, const group *g, int level)
 {
     if (g->count == 1) return g->boxes[0].ref;
+    if (g->count <= BLOCK) {
+        b->binary_count = 0;
+        b->price = MEMORY_PRICE * area(&g->box) / (float)g->count;
+        return emit(b, make_binary(b, g, level));
+    }
     group groups[PL_FRONT_WIDTH];
-    int number = split(g, groups, level);
-    uint32_t index = b->count++;
+    const int number = split(g, groups, level);
+    const uint32_t index = b->count++;
     set_boxes(&b->nodes[index], groups, number);
     for (int i = 0; i < number; i++) {
-        pl_ref child = build(b, &groups[i], level + 3);
+        const pl_ref child = build(b, &groups[i], level + 3);
         b->nodes[index].child[i] = child;
     }
     return pl_ref_of(PL_KIND_NODE, index);
 }
 
-/* --- large trees: the root's children in parallel --- */
+/* --- parts for threads --- */
 
-typedef struct task {
-    group *groups;
-    building *buildings;
-    pl_ref *roots;
-    int number;
-    atomic_int next;
-} task;
+typedef struct part {
+    group whole;
+    int level;
+    struct part *next;  /* to be done after this one */
+    uint32_t nodes, count; /* of a part that was built: where its nodes begin, and their number */
+    pl_ref root;           /* as if they began at 0 */
+    pl_front_node top;     /* of one that was split */
+    int number;            /* … into so many; 0: built */
+    struct part *children[PL_FRONT_WIDTH];
+} part;
+
+/* A part's nodes go to where its boxes stand, TOPS further on: they are fewer than its boxes. */
+typedef struct pool {
+    pl_front_node *nodes;
+    const pl_boxed *boxes;
+    part *waiting;
+    uint32_t unfinished, tops;
+    bool failed;
+    pthread_mutex_t lock;
+    pthread_cond_t changed;
+} pool;
+
+static part *part_of(const group *g, int level)
+{
+    part *fresh = aligned_alloc(64, (sizeof *fresh + 63) & ~(size_t)63);
+    if (fresh) *fresh = (part){.whole = *g, .level = level};
+    return fresh;
+}
+
+static void free_part(part *p)
+{
+    for (int i = 0; p && i < p->number; i++) free_part(p->children[i]);
+    free(p);
+}
+
+/* Builds a part, or splits it. false: no memory. */
+static bool do_part(const pool *p, part *at, building *b)
+{
+    if (at->whole.count <= PART) {
+        at->nodes = (uint32_t)(at->whole.boxes - p->boxes) + TOPS;
+        b->nodes = p->nodes + at->nodes;
+        b->count = 0;
+        at->root = build(b, &at->whole, at->level);
+        at->count = b->count;
+        return true;
+    }
+    group groups[PL_FRONT_WIDTH];
+    const int number = split(&at->whole, groups, at->level);
+    set_boxes(&at->top, groups, number);
+    for (; at->number < number; at->number++)
+        if (!(at->children[at->number] = part_of(&groups[at->number], at->level + 3))) return false;
+    return true;
+}
 
 static void *work(void *context)
 {
-    task *t = context;
-    for (int i; (i = atomic_fetch_add(&t->next, 1)) < t->number;)
-        if (t->buildings[i].nodes) t->roots[i] = build(&t->buildings[i], &t->groups[i], 3);
+    pool *p = context;
+    building b = {.binary = aligned_alloc(64, 2 * BLOCK * sizeof *b.binary)};
+    pthread_mutex_lock(&p->lock);
+    if (!b.binary) p->failed = true;
+    while (!p->failed && p->unfinished) {
+        part *at = p->waiting;
+        if (!at) {
+            pthread_cond_wait(&p->changed, &p->lock);
+            continue;
+        }
+        p->waiting = at->next;
+        pthread_mutex_unlock(&p->lock);
+        const bool ok = do_part(p, at, &b);
+        pthread_mutex_lock(&p->lock);
+        p->failed = p->failed || !ok;
+        p->tops += at->number > 0;
+        p->unfinished += (uint32_t)at->number;
+        p->unfinished--;
+        for (int i = 0; i < at->number; i++) {
+            at->children[i]->next = p->waiting;
+            p->waiting = at->children[i];
+        }
+        pthread_cond_broadcast(&p->changed);
+    }
+    pthread_cond_broadcast(&p->changed);
+    pthread_mutex_unlock(&p->lock);
+    free(b.binary);
     return NULL;
 }
 
-static uint32_t append(pl_front_node *nodes, uint32_t count, const building *b, pl_ref *root)
+/* Numbers a part's nodes from *count on and moves them there. Parts come in the order of their boxes, so nothing is
+ * overwritten that is still to be moved, as long as there are no more tops than TOPS. */
+static pl_ref gather(const part *at, const pl_front_node *from, pl_front_node *to, uint32_t *count)
 {
-    for (uint32_t i = 0; i < b->count; i++) {
-        nodes[count + i] = b->nodes[i];
-        for (int c = 0; c < PL_FRONT_WIDTH; c++)
-            if (nodes[count + i].child[c] >> PL_REF_SHIFT == PL_KIND_NODE) nodes[count + i].child[c] += count;
+    if (at->number == 0) {
+        pl_front_node *own = to + *count;
+        memmove(own, from + at->nodes, at->count * sizeof *own);
+        for (uint32_t i = 0; i < at->count; i++)
+            for (int c = 0; c < PL_FRONT_WIDTH; c++)
+                if (own[i].child[c] >> PL_REF_SHIFT == PL_KIND_NODE) own[i].child[c] += *count;
+        const pl_ref root = at->root >> PL_REF_SHIFT == PL_KIND_NODE ? at->root + *count : at->root;
+        *count += at->count;
+        return root;
     }
-    if (*root >> PL_REF_SHIFT == PL_KIND_NODE) *root += count;
-    return count + b->count;
+    const uint32_t index = (*count)++;
+    to[index] = at->top;
+    for (int i = 0; i < at->number; i++) {
+        const pl_ref child = gather(at->children[i], from, to, count);
+        to[index].child[i] = child;
+    }
+    return pl_ref_of(PL_KIND_NODE, index);
 }
 
-static uint32_t build_parallel(const group *whole, pl_front_node *nodes, int threads)
+static pl_front_node *allocate(size_t nodes)
 {
-    group groups[PL_FRONT_WIDTH];
-    building buildings[PL_FRONT_WIDTH] = {0};
-    pl_ref roots[PL_FRONT_WIDTH];
+    return aligned_alloc(64, (nodes * sizeof(pl_front_node) + 63) & ~(size_t)63);
+}
+
+/* Gives back what wasn't needed. */
+static pl_front_node *shrink(pl_front_node *nodes, uint32_t count)
+{
+    pl_front_node *kept = realloc(nodes, (count * sizeof *nodes + 64) & ~(size_t)63);
+    if (!kept || (uintptr_t)kept % _Alignof(pl_front_node) == 0) return kept ? kept : nodes;
+    pl_front_node *aligned = allocate(count + 1);
+    if (aligned) memcpy(aligned, kept, count * sizeof *kept);
+    free(kept);
+    return aligned;
+}
+
+static pl_front_node *build_parts(const group *whole, uint32_t *count, pl_ref *root, int threads)
+{
     pthread_t started[MOST_THREADS];
-    task t = {.groups = groups, .buildings = buildings, .roots = roots, .number = split(whole, groups, 0)};
+    pool p = {.nodes = allocate(whole->count + TOPS), .boxes = whole->boxes, .waiting = part_of(whole, 0), .unfinished = 1,
+              .lock = PTHREAD_MUTEX_INITIALIZER, .changed = PTHREAD_COND_INITIALIZER};
+    part *first = p.waiting;
     int others = 0;
-    for (int i = 0; i < t.number; i++)
-        buildings[i].nodes = aligned_alloc(64, (groups[i].count * sizeof *nodes + 63) & ~(size_t)63);
-    if (threads > PL_FRONT_WIDTH) threads = PL_FRONT_WIDTH;
-    while (others < threads - 1 && pthread_create(&started[others], NULL, work, &t) == 0) others++;
-    work(&t);
+    p.failed = !p.nodes || !first;
+    if (threads > MOST_THREADS) threads = MOST_THREADS;
+    while (others < threads - 1 && pthread_create(&started[others], NULL, work, &p) == 0) others++;
+    work(&p);
     for (int i = 0; i < others; i++) pthread_join(started[i], NULL);
-    set_boxes(&nodes[0], groups, t.number);
-    uint32_t count = 1;
-    for (int i = 0; i < t.number; i++) {
-        if (buildings[i].nodes) {
-            count = append(nodes, count, &buildings[i], &roots[i]);
-        } else { /* no memory for a part of its own: in place, after the others */
-            building b = {nodes, count};
-            roots[i] = build(&b, &groups[i], 3);
-            count = b.count;
-        }
-        free(buildings[i].nodes);
-        nodes[0].child[i] = roots[i];
+    *count = 0;
+    pl_front_node *nodes = p.nodes;
+    if (!p.failed) {
+        if (p.tops > TOPS) nodes = allocate(whole->count + p.tops);
+        if (nodes) *root = gather(first, p.nodes, nodes, count);
+        if (nodes != p.nodes) free(p.nodes);
+        nodes = nodes ? shrink(nodes, *count) : NULL;
+    } else {
+        free(p.nodes);
+        nodes = NULL;
     }
-    return count;
+    free_part(first);
+    return nodes;
 }
 
-size_t pl_front_most_nodes(size_t boxes)
-{
-    return boxes ? boxes : 1;
-}
-
-uint32_t pl_front_tree(pl_boxed *boxes, size_t count, pl_front_node *nodes, pl_ref *root, int threads)
+pl_front_node *pl_front_tree(pl_boxed *boxes, size_t count, uint32_t *node_count, pl_ref *root, int threads)
 {
     *root = PL_NOTHING;
-    if (count == 0) return 0;
-    group whole = group_of(boxes, count);
-    building b = {nodes, 0};
-    if (count < PARALLEL || threads < 2) {
+    *node_count = 0;
+    if (count == 0) return allocate(1);
+    const group whole = group_of(boxes, count);
+    if (count > PART) return build_parts(&whole, node_count, root, threads);
+    const size_t binary = 2 * (count < BLOCK ? count : BLOCK);
+    building b = {.nodes = allocate(count), .binary = aligned_alloc(64, (binary * sizeof *b.binary + 63) & ~(size_t)63)};
+    if (b.nodes && b.binary) {
         *root = build(&b, &whole, 0);
-        return b.count;
+        *node_count = b.count;
+        b.nodes = shrink(b.nodes, b.count);
+    } else {
+        free(b.nodes);
+        b.nodes = NULL;
     }
-    *root = pl_ref_of(PL_KIND_NODE, 0);
-    return build_parallel(&whole, nodes, threads);
+    free(b.binary);
+    return b.nodes;
 }

@@ -333,7 +333,7 @@ static void set_corners(pl_terrain_tile *tile, uint32_t leaf, double corners[3][
 /* Boxes and corners of a tile, from its values. */
 static void set_tile(const pl_terrain *terrain, uint64_t index, pl_boxed *box)
 {
-    static const pl_boxed nothing = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0};
+    static const pl_boxed nothing = {.lo = {INFINITY, INFINITY, INFINITY}, .hi = {-INFINITY, -INFINITY, -INFINITY}};
     pl_terrain_tile *tile = (pl_terrain_tile *)pl_terrain_tile_at(terrain, index);
     pl_boxed clusters[PL_TERRAIN_CLUSTERS];
     double corners[PL_TERRAIN_TILE][3][3];
@@ -383,20 +383,14 @@ static bool set_frame(pl_terrain *terrain, const bounds *b)
 
 static bool build_tree(pl_terrain *terrain, int threads)
 {
-    pl_boxed *boxes = malloc(terrain->tiles * sizeof *boxes);
-    size_t most = pl_front_most_nodes(terrain->tiles) * sizeof(pl_front_node);
-    pl_front_node *nodes = aligned_alloc(64, (most + 63) & ~(size_t)63), *kept = NULL;
-    if (boxes && nodes) {
-        for (uint64_t i = 0; i < terrain->tiles; i++) set_tile(terrain, i, &boxes[i]);
-        uint32_t count = pl_front_tree(boxes, terrain->tiles, nodes, &terrain->front.root, threads);
-        terrain->node_bytes = (count * sizeof *nodes + 63) & ~(size_t)63;
-        kept = aligned_alloc(64, terrain->node_bytes);
-        if (kept) memcpy(kept, nodes, count * sizeof *nodes);
-        terrain->front.nodes = kept;
-    }
+    pl_boxed *boxes = calloc(terrain->tiles, sizeof *boxes);
+    uint32_t count;
+    if (!boxes) return false;
+    for (uint64_t i = 0; i < terrain->tiles; i++) set_tile(terrain, i, &boxes[i]);
+    terrain->front.nodes = pl_front_tree(boxes, terrain->tiles, &count, &terrain->front.root, threads);
+    terrain->node_bytes = count * sizeof *terrain->front.nodes;
     free(boxes);
-    free(nodes);
-    return kept != NULL;
+    return terrain->front.nodes;
 }
 
 /* Rays jump about in large terrains; where there are large pages, finding a page's place is what they needn't wait for. */

@@ -146,6 +146,10 @@ typedef struct pl_statistics {
     uint64_t lazy_found;   /* times that a ray came to a state that was in memory already */
     uint64_t terrain_tiles; /* of regular subdivisions; their bytes are nodes and items */
     double seconds_first_pixel; /* from the last rendering's start to its first pixel's colour; 0: nothing rendered */
+    /* Of bvh, where not everything fits: rays of the pilot, instances that a ray is then expected to enter, bytes that all
+     * opened would take. pilot_seconds is a part of seconds_build, 0: no pilot. */
+    uint64_t front_pilot_rays, front_flat_bytes;
+    double front_entries, front_pilot_seconds;
 } pl_statistics;
 
 PL_API void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics);

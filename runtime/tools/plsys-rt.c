@@ -29,6 +29,8 @@ static const char usage[] =
     "  --size WxH          in pixels (640x480)\n"
     "  --threads N         1 to 1024 (one a core)\n"
     "  --accel A           auto, none, boxes, grid or bvh: same picture, different speed (auto)\n"
+    "  --memory SIZE       of states and structures: 64K, 1M, 2G (by the caches)\n"
+    "  --front K           at most K items in a front of bvh, or all (by the memory)\n"
     "  --grid NxMxK        voxels of --accel grid (16x16x8)\n"
     "  --antialias A       off, grid=N (centre and NxN sub-cells) or adaptive=DEPTH (off)\n"
     "  --detail PX         draw what is smaller than PX pixels as a box, 0: nothing (0; 0.5 where a recursion has no end)\n"
@@ -100,6 +102,32 @@ static bool parse_detail(const char *text, double *detail)
     return true;
 }
 
+/* Bytes, with K, M and G for powers of 1024. */
+static bool parse_size(const char *text, size_t *size)
+{
+    static const char units[] = "KMG";
+    char *after;
+    double value = strtod(text, &after);
+    if (after == text) return false;
+    const char *unit = *after ? strchr(units, *after) : NULL;
+    if (*after && (!unit || after[1])) return false;
+    for (long i = unit ? unit - units : -1; i >= 0; i--) value *= 1024.0;
+    if (!(value >= 1.0 && value < 0x1p62)) return false;
+    *size = (size_t)value;
+    return true;
+}
+
+static bool parse_front(const char *text, uint64_t *items)
+{
+    char *after;
+    *items = UINT64_MAX;
+    if (strcmp(text, "all") == 0) return true;
+    if (*text < '0' || *text > '9') return false;
+    errno = 0;
+    *items = strtoull(text, &after, 10);
+    return !errno && !*after && *items > 0;
+}
+
 static bool parse_grid(const char *text, uint32_t grid[3])
 {
     int sides[3];
@@ -128,6 +156,11 @@ static bool parse_value(arguments *a, const char *option, const char *value)
     if (strcmp(option, "--accel") == 0)
         return parse_accelerator(value, &a->options.accelerator) ||
                complain("--accel %s: expected auto, none, boxes, grid or bvh", value);
+    if (strcmp(option, "--memory") == 0)
+        return parse_size(value, &a->options.memory) || complain("--memory %s: expected a size, such as 64K, 1M or 2G", value);
+    if (strcmp(option, "--front") == 0)
+        return parse_front(value, &a->options.front_items) ||
+               complain("--front %s: expected a number of items, 1 or more, or all", value);
     if (strcmp(option, "--grid") == 0)
         return parse_grid(value, a->options.grid) || complain("--grid %s: expected NxMxK, such as 16x16x8", value);
     if (strcmp(option, "--detail") == 0)

@@ -3,6 +3,8 @@ same bits as those of the graph itself."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -78,7 +80,7 @@ def test_items_instruction_sets_and_memory_do_not_show(name):
     for items in ITEMS:
         for isa in available(data):
             assert_same(answers(data, origins, directions, front_items=items, isa=isa), expected, (items, isa))
-    for kilobytes in (1024, 4096, 2**20):
+    for kilobytes in (64, 256, 1024, 4096, 2**20):
         ours = answers(data, origins, directions, memory=kilobytes * 1024)
         assert_same(ours, expected, f"{kilobytes} KB")
 
@@ -88,7 +90,8 @@ def test_the_picture_is_the_same(name):
     data = compile(ROOT / "scenes" / f"{name}.plsys", parameters=SCENES[name])
     with Scene(data, accelerator="boxes") as scene:
         expected = scene.render(48, 36)["color"]
-    for options in [{"front_items": items} for items in ITEMS] + [{"isa": isa} for isa in available(data)]:
+    budgets = [{"memory": kilobytes * 1024} for kilobytes in (64, 1024, 2**20)]
+    for options in [{"front_items": items} for items in ITEMS] + [{"isa": isa} for isa in available(data)] + budgets:
         with Scene(data, **options) as scene:
             np.testing.assert_array_equal(scene.render(48, 36)["color"], expected, err_msg=str(options))
 
@@ -131,3 +134,86 @@ def test_an_instruction_set_that_is_not_one_is_refused():
     data = compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 1})
     with pytest.raises(PlsysRuntimeError, match="isa"):
         Scene(data, isa="mmx")
+
+
+def test_threads_build_the_same_fronts():
+    """Large ones are opened and their trees built by all threads; where things stand in memory shows in no hit, but in counts."""
+    data = compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 15})
+    origins, directions = rays(compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 8}), 500, 3)
+    seen = []
+    for threads in (1, 2, 3, 7):
+        with Scene(data, front_items=ALL, threads=threads) as scene:
+            hits = scene.intersect(origins, directions)
+            counts = scene.statistics
+        seen.append([counts[name] for name in ("box_tests", "filtered", "primitive_tests", "bytes", "front")])
+        expected = hits if threads == 1 else expected
+        for ours, theirs in zip(hits, expected):
+            np.testing.assert_array_equal(ours, theirs)
+    assert all(counts == seen[0] for counts in seen)
+
+
+def test_what_pays_is_opened_and_no_more():
+    """By default: little of a sponge, where each level costs twenty copies, all of a small tree."""
+    tree = compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 6})
+    sponge = compile(ROOT / "scenes" / "menger.plsys", parameters={"level": 5})
+    with Scene(tree) as scene:
+        assert scene.statistics["front"]["limit"] is None and scene.statistics["front"]["pilot_rays"] == 0
+    with Scene(sponge) as scene:
+        front, size = scene.statistics["front"], scene.statistics["scene_bytes"]
+        assert front["pilot_rays"] > 0 and 0 < front["entries"] < 5
+        assert size < front["flat_bytes"] / 100
+    with Scene(sponge, memory=size * 3 // 4) as less:
+        assert less.statistics["front"]["entries"] > front["entries"]
+
+
+def test_what_occurs_once_needs_no_front():
+    """A forest's ten thousand places stand in the scene's own front."""
+    data = compile(ROOT / "scenes" / "forest.plsys", parameters={"order": 4})
+    with Scene(data) as scene:
+        front = scene.statistics["front"]
+    assert front["limit"] > 10_000 and front["count"] < 300
+
+
+def test_fronts_that_do_not_fit_are_left_for_unfolding_on_touch():
+    data = compile(ROOT / "scenes" / "forest.plsys", parameters={"order": 3})
+    origins = np.random.default_rng(1).uniform((0, 0, 3), (300, 300, 4), (40, 3))
+    directions = np.tile((0.1, 0.2, -1.0), (40, 1))
+    with Scene(data) as scene, Scene(data, memory=1 << 20) as less:
+        assert less.statistics["front"]["count"] == 0 < scene.statistics["front"]["count"]
+        for ours, theirs in zip(scene.intersect(origins, directions), less.intersect(origins, directions)):
+            np.testing.assert_array_equal(ours, theirs)
+        assert less.statistics["lazy"]["unfolded"] > 0
+
+
+def test_a_budget_below_every_floor_names_the_need():
+    data = compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 12})
+    with pytest.raises(PlsysRuntimeError, match=r"needs at least \d+ KB; 10 KB are allowed|memory"):
+        Scene(data, memory=10 * 1024)
+
+
+PROBE = """
+import resource, sys
+from plsys.runtime import Scene
+data, memory = open(sys.argv[1], "rb").read(), int(sys.argv[2])
+with Scene(data, memory=memory, threads=1) as scene:
+    scene.render(64, 48)
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, scene.statistics["front"]["count"])
+"""
+
+
+def peak(path: Path, memory: int) -> tuple[int, int]:
+    done = subprocess.run([sys.executable, "-c", PROBE, path, str(memory)], capture_output=True, text=True, check=True)
+    size, fronts = done.stdout.split()
+    return int(size), int(fronts)
+
+
+def test_the_process_stays_under_the_budget(tmp_path):
+    """Its peak, building included, less that of a process with next to no scene."""
+    for order in (0, 16):
+        data = compile(ROOT / "scenes" / "tree.plsys", parameters={"order": order})
+        (tmp_path / f"{order}.plsb").write_bytes(data)
+    without, _ = peak(tmp_path / "0.plsb", 1 << 20)
+    for budget in (64 << 10, 1 << 20, 4 << 20, 16 << 20, 1 << 30):
+        with_, fronts = peak(tmp_path / "16.plsb", budget)
+        assert fronts > 0
+        assert with_ - without <= 1.1 * budget + (512 << 10), budget

@@ -1,0 +1,369 @@
+/* front_plan.c - which states are opened in which fronts (front.h).
+ *
+ * A ray that enters an instance pays for mapping it and for looking at another front's root; opening the instance's
+ * state in place saves that, and costs memory for a copy of the state's items. With p(i | s) the probability that a ray in
+ * state s enters its item i, a front is expected to be visited v times a ray, and an instance in it, below items i1 …
+ * in of opened states, v · p(i1) · … · p(in) times. An instance is opened where that pays for the memory at one
+ * price for the whole scene:
+ *
+ *     visits > price · bytes                      (a Lagrange multiplier: no exchange of openings would be better)
+ *
+ * Parents are deeper than their children (pl_state.depth), so one pass in this order knows every front's v before it looks
+ * at the front. The price is found by trying: lower ones until the memory is used up, or until a doubling of the memory no
+ * longer wins 7 %. What occurs once is opened always, since that copies nothing.
+ *
+ * p comes from the pilot's rays, and from areas where they haven't been: (entries + K·area share) / (visits + K). */
+#include "front.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "../error.h"
+
+/* A primitive's share of nodes: about 7 of eight children are there, one of them a node. */
+#define NODE_BYTES_AN_ITEM (sizeof(pl_front_node) / 5.8)
+#define PRIMITIVE_BYTES (sizeof(pl_front_primitive) + NODE_BYTES_AN_ITEM)
+#define INSTANCE_BYTES (sizeof(pl_front_instance) + NODE_BYTES_AN_ITEM)
+#define PRIOR_VISITS 8.0
+
+/* Time besides instances, in instances: a ray of a flat scene takes about as long as entering so many (measured). */
+#define REST_OF_A_RAY(primitives) fmax(1.0, 0.3 * log2(1.0 + (primitives)) - 1.2)
+/* A doubling of memory must win 7 %: 2^-0.1 = 0.93. */
+#define MEMORY_EXPONENT 0.1
+
+/* Opening anything adds more bytes than this, or nothing. */
+#define LEAST_STEP 1.0
+
+enum { PRICES = 48 };
+
+static bool occurs(const pl_states *states, const pl_item *item)
+{
+    return pl_item_primitives(states, item) > 0;
+}
+
+/* --- what is known of states before any price --- */
+
+static int deeper(const void *a, const void *b)
+{
+    const pl_state *const *x = a, *const *y = b;
+    if ((*x)->depth != (*y)->depth) return (*x)->depth > (*y)->depth ? -1 : 1;
+    return *x < *y ? -1 : *x > *y;
+}
+
+/* States, each before those that it enters: the scene, then by depth. */
+static bool sort_states(pl_front_plan *plan)
+{
+    const pl_states *states = plan->compositions->states;
+    const pl_state **sorted = malloc(states->count * sizeof *sorted);
+    if (!sorted) return false;
+    for (uint32_t i = 0; i < states->count; i++) sorted[i] = &states->list[i];
+    qsort(sorted + 1, states->count - 1, sizeof *sorted, deeper);
+    for (uint32_t i = 0; i < states->count; i++) plan->order[i] = (uint32_t)(sorted[i] - states->list);
+    free(sorted);
+    return true;
+}
+
+/* What a copy of a state in another front adds: its items and itself, less the instance. What is opened always counts as
+ * a part of the state that it stands in. */
+static void find_bytes(pl_front_plan *plan, bool once_is_free)
+{
+    const pl_states *states = plan->compositions->states;
+    uint32_t *references = plan->front_of; /* borrowed: counted once, then cleared */
+    for (uint32_t i = 0; once_is_free && i < states->count; i++)
+        for (uint32_t k = 0; k < states->list[i].item_count; k++) {
+            const pl_item *item = &states->list[i].items[k];
+            if (item->kind == PL_NODE_ENTER && occurs(states, item)) references[item->what]++;
+        }
+    for (uint32_t i = states->count; i-- > 0;) {
+        const uint32_t index = plan->order[i];
+        const pl_state *state = &states->list[index];
+        double bytes = sizeof(pl_opened);
+        uint32_t live = 0;
+        for (uint32_t k = 0; k < state->item_count; k++) {
+            const pl_item *item = &state->items[k];
+            if (!occurs(states, item)) continue;
+            live++;
+            if (item->kind != PL_NODE_ENTER) bytes += PRIMITIVE_BYTES;
+            else bytes += INSTANCE_BYTES + (plan->price_free[item->what] ? plan->bytes[item->what] : 0.0);
+        }
+        plan->bytes[index] = fmax(bytes - INSTANCE_BYTES, 1.0);
+        plan->price_free[index] = (live <= 1 && !state->endless) || references[index] == 1;
+    }
+    memset(references, 0, states->count * sizeof *references);
+}
+
+/* The probability that a ray in a state enters an item of it. */
+static double probability(const pl_front_plan *plan, const pl_pilot *pilot, uint32_t state, uint32_t index)
+{
+    const pl_states *states = plan->compositions->states;
+    const pl_item *item = &states->list[state].items[index];
+    const size_t at = plan->compositions->first[state] + index;
+    const double whole = pl_box_area(&states->list[state].box);
+    const pl_box box = pl_box_map(&plan->compositions->list[at].to_parent, &states->list[item->what].box);
+    double share = states->list[item->what].unbounded ? 1.0 : pl_box_area(&box) / whole;
+    if (!(share < 1.0)) share = 1.0;
+    return pilot ? (pilot->entries[at] + PRIOR_VISITS * share) / (pilot->visits[state] + PRIOR_VISITS) : share;
+}
+
+static void find_probabilities(pl_front_plan *plan, const pl_pilot *pilot)
+{
+    const pl_states *states = plan->compositions->states;
+    for (uint32_t i = 0; i < states->count; i++)
+        for (uint32_t k = 0; k < states->list[i].item_count; k++)
+            if (states->list[i].items[k].kind == PL_NODE_ENTER)
+                plan->probability[plan->compositions->first[i] + k] = (float)probability(plan, pilot, i, k);
+}
+
+pl_front_plan *pl_front_plan_create(const pl_compositions *compositions, const pl_pilot *pilot, bool once_is_free,
+                                    pl_error *error)
+{
+    const uint32_t count = compositions->states->count;
+    pl_front_plan *plan = calloc(1, sizeof *plan);
+    if (plan) {
+        plan->compositions = compositions;
+        plan->order = malloc(count * sizeof *plan->order);
+        plan->front_of = calloc(count, sizeof *plan->front_of);
+        plan->bytes = calloc(count, sizeof *plan->bytes);
+        plan->price_free = calloc(count, sizeof *plan->price_free);
+        plan->visits = malloc(count * sizeof *plan->visits);
+        plan->threshold = malloc(count * sizeof *plan->threshold);
+        plan->counts = calloc(count, sizeof *plan->counts);
+        plan->probability = calloc(compositions->first[count] + 1, sizeof *plan->probability);
+        if (plan->order && plan->front_of && plan->bytes && plan->price_free && plan->visits && plan->threshold &&
+            plan->counts && plan->probability && sort_states(plan)) {
+            find_bytes(plan, once_is_free);
+            find_probabilities(plan, pilot);
+            return plan;
+        }
+    }
+    pl_front_plan_free(plan);
+    pl_fail_memory(error, "planning the fronts");
+    return NULL;
+}
+
+void pl_front_plan_free(pl_front_plan *plan)
+{
+    if (!plan) return;
+    free(plan->order);
+    free(plan->front_of);
+    free(plan->bytes);
+    free(plan->price_free);
+    free(plan->visits);
+    free(plan->threshold);
+    free(plan->probability);
+    free(plan->counts);
+    free(plan->counting.stack);
+    free(plan);
+}
+
+double pl_front_plan_flat_bytes(void)
+{
+    return PRIMITIVE_BYTES + sizeof(pl_opened);
+}
+
+/* --- one front --- */
+
+static bool list_state(pl_state_list *states, uint32_t state)
+{
+    if (states->count == states->capacity) {
+        size_t more = 2 * states->capacity + 64;
+        uint32_t *list = realloc(states->list, more * sizeof *list);
+        if (!list) return false;
+        states->list = list;
+        states->capacity = more;
+    }
+    states->list[states->count++] = state;
+    return true;
+}
+
+/* Given to an instance's state whatever its probability, which may be too small for a number: it has a front. */
+#define LEAST_VISITS 1e-300
+
+/* What stands below a state in a front, once that is reached; gives up above `most` items. visits: where not NULL, those
+ * of the instances' states grow by `share` times the probability of entering them. */
+static bool count_below(const pl_front_plan *plan, pl_front_counting *counting, pl_plan_entry from, double threshold,
+                        uint64_t most, double share, double *visits, pl_front_counts *counts)
+{
+    const pl_states *states = plan->compositions->states;
+    size_t top = 0;
+    *counts = (pl_front_counts){.whole = true};
+    for (pl_plan_entry at = from;;) {
+        const pl_state *it = &states->list[at.state];
+        const float *probabilities = plan->probability + plan->compositions->first[at.state];
+        counts->opened++;
+        if (top + it->item_count > counting->capacity) {
+            size_t capacity = 2 * (top + it->item_count) + 64;
+            pl_plan_entry *stack = realloc(counting->stack, capacity * sizeof *stack);
+            if (!stack) return false;
+            counting->stack = stack;
+            counting->capacity = capacity;
+        }
+        for (uint32_t i = 0; i < it->item_count; i++) {
+            const pl_item *item = &it->items[i];
+            if (!occurs(states, item)) continue;
+            const double reached = at.reached * (double)probabilities[i];
+            if (item->kind != PL_NODE_ENTER) {
+                counts->primitives++;
+            } else if (pl_front_opens(plan, threshold, reached, item->what)) {
+                counting->stack[top++] = (pl_plan_entry){item->what, reached};
+            } else {
+                counts->instances++;
+                if (counting->closed && !list_state(counting->closed, item->what)) return false;
+                if (visits) visits[item->what] += share * reached + LEAST_VISITS;
+            }
+        }
+        counts->whole = counts->primitives + counts->instances + top <= most;
+        if (top == 0 || !counts->whole) return true;
+        at = counting->stack[--top];
+    }
+}
+
+static bool count_front(pl_front_plan *plan, uint32_t state, double threshold, uint64_t most, double share,
+                        double *visits, pl_front_counts *counts)
+{
+    return count_below(plan, &plan->counting, (pl_plan_entry){state, 1.0}, threshold, most, share, visits, counts);
+}
+
+bool pl_front_plan_count(const pl_front_plan *plan, pl_front_counting *counting, uint32_t front, uint32_t state,
+                         double reached, pl_front_counts *counts)
+{
+    return count_below(plan, counting, (pl_plan_entry){state, reached}, plan->threshold[front], UINT64_MAX, 0.0, NULL,
+                       counts);
+}
+
+static double bytes_of(const pl_front_counts *counts)
+{
+    return sizeof(pl_front) + 5 * 32.0 + (double)counts->primitives * PRIMITIVE_BYTES +
+           (double)counts->instances * INSTANCE_BYTES + (double)counts->opened * sizeof(pl_opened);
+}
+
+/* --- all fronts at a price --- */
+
+typedef struct outcome {
+    double bytes, entries; /* of instances, a ray */
+    uint64_t instances;
+    bool whole;            /* not given up above `enough` bytes */
+} outcome;
+
+/* Sets the thresholds of all fronts that there are at a price. Only a state with visits has a front. */
+static bool try_price(pl_front_plan *plan, double price, double enough, outcome *out)
+{
+    const uint32_t count = plan->compositions->states->count;
+    *out = (outcome){.whole = true};
+    for (uint32_t i = 0; i < count; i++) plan->visits[i] = 0.0;
+    plan->visits[0] = 1.0;
+    for (uint32_t i = 0; i < count; i++) {
+        const uint32_t state = plan->order[i];
+        pl_front_counts counts;
+        if (!(plan->visits[state] > 0.0)) continue;
+        plan->threshold[state] = price < 0.0 ? -1.0 : price / plan->visits[state];
+        const double most = (enough - out->bytes) / PRIMITIVE_BYTES;
+        if (!count_front(plan, state, plan->threshold[state], most < 1e15 ? (uint64_t)most + 1 : UINT64_MAX,
+                         plan->visits[state], plan->visits, &counts))
+            return false;
+        plan->counts[state] = counts;
+        out->bytes += bytes_of(&counts);
+        out->instances += counts.instances;
+        if (i > 0) out->entries += plan->visits[state];
+        out->whole = counts.whole && out->bytes <= enough;
+        if (!out->whole) return true;
+    }
+    return true;
+}
+
+static double time_of(const pl_front_plan *plan, const outcome *out)
+{
+    return out->entries + REST_OF_A_RAY((double)plan->compositions->states->list[0].primitives);
+}
+
+/* Lower prices from one that is too high for anything, until they no longer fit into `most` bytes. *best: with `fill`
+ * the lowest that fits; else the one with the least time · memory^MEMORY_EXPONENT. closed: the outcome of the first. */
+static bool find_price(pl_front_plan *plan, const outcome *closed, double most, bool fill, double *best)
+{
+    double least = INFINITY, fits = closed->entries / LEAST_STEP, too_low = 0.0;
+    outcome out = *closed;
+    for (int i = 0; i < PRICES && out.instances; i++) {
+        if (out.whole) {
+            const double score = fill ? fits : time_of(plan, &out) * pow(out.bytes, MEMORY_EXPONENT);
+            if (score < least) {
+                least = score;
+                *best = fits;
+            }
+        }
+        if (too_low > 0.0 && fits < 1.1 * too_low) break;
+        const double price = too_low > 0.0 ? sqrt(fits * too_low) : fits / (fill ? 4.0 : 2.0);
+        if (!try_price(plan, price, most, &out)) return false;
+        *(out.whole ? &fits : &too_low) = price;
+    }
+    return true;
+}
+
+bool pl_front_plan_budget(pl_front_plan *plan, double budget, bool fill, double *floor, bool *fits, pl_error *error)
+{
+    outcome out;
+    double best = INFINITY;
+    bool ok = try_price(plan, INFINITY, INFINITY, &out);
+    *floor = out.bytes;
+    *fits = ok && out.bytes <= budget;
+    if (*fits) {
+        const outcome closed = out;
+        const double whole = (double)plan->compositions->states->list[0].primitives * PRIMITIVE_BYTES;
+        out.whole = false;
+        if (whole <= budget) ok = try_price(plan, -1.0, budget, &out);
+        if (out.whole) best = -1.0;
+        else ok = ok && find_price(plan, &closed, budget, fill, &best);
+    }
+    ok = ok && try_price(plan, best, INFINITY, &out);
+    plan->estimate = out.bytes;
+    plan->entries = out.entries;
+    return ok || pl_fail_memory(error, "planning the fronts");
+}
+
+/* --- so many items a front --- */
+
+/* The lowest threshold at which a front has no more than `most` items. */
+static bool limit_front(pl_front_plan *plan, uint32_t state, uint64_t most)
+{
+    double fits = INFINITY, too_low = 0.0, threshold = -1.0;
+    pl_front_counts counts;
+    for (int i = 0; i < PRICES; i++) {
+        if (!count_front(plan, state, threshold, most, 0.0, NULL, &counts)) return false;
+        if (counts.whole) fits = threshold;
+        else too_low = fmax(threshold, too_low);
+        /* No item is reached with more than 1, so above that nothing is opened. */
+        if (fits < 0.0 || too_low >= 1.0 || fits < 1.001 * too_low) break;
+        threshold = isinf(fits) ? 1.0 / LEAST_STEP : too_low > 0.0 ? sqrt(fits * too_low) : fits / 16.0;
+    }
+    plan->threshold[state] = fits;
+    return true;
+}
+
+bool pl_front_plan_items(pl_front_plan *plan, uint64_t most, pl_error *error)
+{
+    const uint32_t count = plan->compositions->states->count;
+    bool ok = true;
+    for (uint32_t i = 0; i < count; i++) plan->visits[i] = 0.0;
+    plan->visits[0] = 1.0;
+    for (uint32_t i = 0; i < count && ok; i++) {
+        const uint32_t state = plan->order[i];
+        pl_front_counts counts;
+        if (!(plan->visits[state] > 0.0)) continue;
+        plan->threshold[state] = -1.0;
+        ok = (most == UINT64_MAX || limit_front(plan, state, most)) &&
+             count_front(plan, state, plan->threshold[state], UINT64_MAX, plan->visits[state], plan->visits, &counts);
+        plan->counts[state] = counts;
+        plan->estimate += bytes_of(&counts);
+        if (i > 0) plan->entries += plan->visits[state];
+    }
+    return ok || pl_fail_memory(error, "planning the fronts");
+}
+
+bool pl_front_plan_single(pl_front_plan *plan, uint32_t state, uint64_t most, pl_front_counts *counts, pl_error *error)
+{
+    plan->threshold[state] = most ? -1.0 : (double)NAN;
+    const bool ok = (most == UINT64_MAX || most == 0 || limit_front(plan, state, most)) &&
+                    count_front(plan, state, plan->threshold[state], UINT64_MAX, 0.0, NULL, counts);
+    plan->counts[state] = *counts;
+    return ok || pl_fail_memory(error, "planning the fronts");
+}
