@@ -29,7 +29,7 @@ typedef float four __attribute__((vector_size(16)));
 typedef int32_t four_ints __attribute__((vector_size(16)));
 
 #ifdef __SSE2__
-#include <emmintrin.h>
+#include <immintrin.h>
 static inline four least(four a, four b)
 {
     return (four)_mm_min_ps((__m128)a, (__m128)b);
