@@ -67,6 +67,15 @@ static inline double pl_box_reach(const pl_box *box)
     return reach;
 }
 
+/* The length of its diagonal; 0 for an empty box. */
+static inline double pl_box_diameter(const pl_box *box)
+{
+    double square = 0.0;
+    for (int axis = 0; axis < 3 && !pl_box_is_empty(box); axis++)
+        square += (box->hi[axis] - box->lo[axis]) * (box->hi[axis] - box->lo[axis]);
+    return sqrt(square);
+}
+
 /* A ray prepared for slab tests: per axis the origin moved by the slack for the near and the far plane. */
 typedef struct pl_slab {
     double near_origin[3], far_origin[3], inverse[3];

@@ -175,3 +175,11 @@ void pl_classes_bound(pl_classes *c, uint32_t symbol, const pl_scope *scope, pl_
     *work += pl_class_walk_visited(c->walk) - before;
     pthread_mutex_unlock(&c->lock);
 }
+
+void pl_classes_gate(pl_classes *c, uint32_t symbol, const pl_scope *scope, pl_gate_box *gate)
+{
+    pl_bounds bounds;
+    uint64_t work = 0;
+    pl_classes_bound(c, symbol, scope, &bounds, &work);
+    *gate = pl_bounds_gate(&bounds);
+}

@@ -13,13 +13,14 @@
  * intervals are followed on a fine grid and, where that gives nothing, on a coarse one, on which fewer classes are met.
  *
  *     class.c  the table          class_walk.c  following the graph          class_box.c  boxes below transformations
+ *     class_cover.c  what a cut-off draws of a class
  *
  * Safe from any thread: one lock, held on the way to a state that isn't unfolded yet. */
 #ifndef PL_CLASS_H
 #define PL_CLASS_H
 
+#include "cut.h"
 #include "interval.h"
-#include "state.h"
 
 typedef struct pl_bounds {
     pl_box box;
@@ -37,11 +38,24 @@ void pl_classes_free(pl_classes *classes);
 /* Bounds of the state that a scope leads to at a symbol node, in its own frame. *work grows by the nodes visited. */
 void pl_classes_bound(pl_classes *classes, uint32_t symbol, const pl_scope *scope, pl_bounds *bounds, uint64_t *work);
 
+/* The same as a gate sees it. */
+void pl_classes_gate(pl_classes *classes, uint32_t symbol, const pl_scope *scope, pl_gate_box *gate);
+pl_gate_box pl_bounds_gate(const pl_bounds *bounds);
+
 /* Classes in the table now, how often it was emptied, and nodes visited. */
 typedef struct pl_class_counts {
     uint64_t classes, emptied, visited;
 } pl_class_counts;
 void pl_classes_count(pl_classes *classes, pl_class_counts *counts);
+
+/* --- class_cover.c --- */
+
+typedef struct pl_covers pl_covers;
+pl_covers *pl_covers_create(const pl_program *program, pl_mesh_tree *const *meshes, pl_classes *classes, pl_error *error);
+void pl_covers_free(pl_covers *covers);
+
+/* The share of its box's silhouette that the state covers which a scope leads to, from a direction of its frame. */
+double pl_covers_of(pl_covers *covers, uint32_t symbol, const pl_scope *scope, const double d[3]);
 
 /* --- class_box.c --- */
 
@@ -54,17 +68,21 @@ void pl_bounds_of_leaf(const pl_box *box, bool unbounded, pl_bounds *bounds);
 /* Of both, or of one of them. */
 void pl_bounds_join(pl_bounds *a, const pl_bounds *b, bool alternative);
 
-/* Bounds seen from above a transformation, known exactly or in intervals. */
-void pl_bounds_through(const pl_transform *transform, pl_bounds *bounds);
+/* Bounds seen from above a transformation, known exactly or in intervals. whole: the box is to hold not only what stands in the
+ * box below but all of it, as that of an instance that may be drawn as its box. */
+void pl_bounds_through(const pl_transform *transform, bool whole, pl_bounds *bounds);
 void pl_bounds_through_range(const pl_range_map *map, pl_bounds *bounds);
+
+/* The box alone. */
+void pl_box_through(const pl_transform *transform, pl_box *box);
 
 /* A little wider than rounding of composing and mapping could make a box. */
 void pl_box_widen(pl_box *box);
 
 /* --- class_walk.c --- */
 
-/* Parts of an octave that intervals are widened to: of a state's own class, and on the way down. */
-typedef enum pl_class_grid { PL_GRID_CLASS, PL_GRID_FINE, PL_GRID_COARSE } pl_class_grid;
+/* Parts of an octave that intervals are widened to: of a state's own class, on the way down, and for coverages. */
+typedef enum pl_class_grid { PL_GRID_CLASS, PL_GRID_FINE, PL_GRID_COARSE, PL_GRID_COVER } pl_class_grid;
 
 /* The live parameters of a scope (a range for each parameter), widened; live has room for the symbol's. */
 void pl_class_of(const pl_program *program, uint32_t symbol, const pl_range *scope, pl_class_grid grid, pl_range *live);

@@ -56,20 +56,32 @@ static void tighten(pl_bounds *bounds)
     bounds->reach.size = fmin(bounds->reach.size, sqrt(square) * (1.0 + 1e-12));
 }
 
-void pl_bounds_through(const pl_transform *transform, pl_bounds *bounds)
+/* Roundings are below those of a sum of four products, three of which have no larger factors than the largest coordinate and
+ * the largest entry. */
+void pl_box_through(const pl_transform *transform, pl_box *box)
 {
-    double reach = pl_box_is_empty(&bounds->box) ? 0.0 : pl_box_reach(&bounds->box), move = 0.0;
-    for (int r = 0; r < 3; r++) move = fmax(move, fabs(transform->to_parent.m[4 * r + 3]));
-    bounds->reach = pl_reach_through(transform, &bounds->reach);
-    if (!bounds->unbounded) bounds->box = pl_box_map(&transform->to_parent, &bounds->box);
-    double slack = 16.0 * DBL_EPSILON * (reach * pl_largest_stretch(&transform->to_parent) + move);
-    for (int axis = 0; axis < 3 && !pl_box_is_empty(&bounds->box); axis++) {
-        bounds->box.lo[axis] -= slack;
-        bounds->box.hi[axis] += slack;
+    if (pl_box_is_empty(box)) return;
+    const double *m = transform->to_parent.m, reach = pl_box_reach(box);
+    double entry = 0.0, move = 0.0;
+    for (int i = 0; i < 12; i++) {
+        if (i % 4 == 3) move = fmax(move, fabs(m[i]));
+        else entry = fmax(entry, fabs(m[i]));
     }
-    pl_box_widen(&bounds->box);
+    *box = pl_box_map(&transform->to_parent, box);
+    const double slack = 16.0 * DBL_EPSILON * (3.0 * reach * entry + move);
+    for (int axis = 0; axis < 3; axis++) {
+        box->lo[axis] -= slack;
+        box->hi[axis] += slack;
+    }
+    pl_box_widen(box);
+}
+
+void pl_bounds_through(const pl_transform *transform, bool whole, pl_bounds *bounds)
+{
+    bounds->reach = pl_reach_through(transform, &bounds->reach);
+    if (!bounds->unbounded) pl_box_through(transform, &bounds->box);
     if (!pl_box_is_empty(&bounds->box) && !pl_box_is_finite(&bounds->box)) bounds->unbounded = true;
-    if (!bounds->unbounded) tighten(bounds);
+    if (!bounds->unbounded && !whole) tighten(bounds);
 }
 
 void pl_bounds_through_range(const pl_range_map *map, pl_bounds *bounds)
@@ -98,4 +110,12 @@ void pl_bounds_through_range(const pl_range_map *map, pl_bounds *bounds)
     pl_box_widen(&bounds->box);
     if (!pl_box_is_finite(&bounds->box)) bounds->unbounded = true;
     else tighten(bounds);
+}
+
+pl_gate_box pl_bounds_gate(const pl_bounds *bounds)
+{
+    pl_gate_box gate = {bounds->box, bounds->reach, pl_box_diameter(&bounds->box), bounds->unbounded, false};
+    /* Points of the box are meant, which may be farther out than what stands in it. */
+    if (!gate.unbounded) gate.reach.size = 1.7320508075688774 * pl_box_reach(&gate.box);
+    return gate;
 }

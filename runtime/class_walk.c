@@ -108,7 +108,7 @@ static cell *cell_at(const pl_class_walk *w, uint32_t index)
 /* Outward to a grid of 2^bits steps an octave; whole numbers that are known and count stay. */
 static pl_range on_grid(pl_range a, pl_class_grid grid)
 {
-    static const int bits[] = {[PL_GRID_CLASS] = 5, [PL_GRID_FINE] = 8, [PL_GRID_COARSE] = 4};
+    static const int bits[] = {[PL_GRID_CLASS] = 5, [PL_GRID_FINE] = 8, [PL_GRID_COARSE] = 4, [PL_GRID_COVER] = 2};
     int exponent;
     if (isnan(a.lo) || !isfinite(a.lo) || !isfinite(a.hi)) return a;
     if (a.lo == a.hi && a.lo == floor(a.lo) && fabs(a.lo) <= (grid == PL_GRID_COARSE ? 64.0 : 0x1p20)) return a;
@@ -328,7 +328,7 @@ static bool ascend(pl_class_walk *w, pl_bounds *bounds, bool fresh, uint32_t *no
     level *l = (level *)w->levels.data + w->levels.count - 1;
     switch (l->kind) {
     case PL_NODE_TRANSFORM:
-        pl_bounds_through(&w->program->transforms[w->program->nodes[l->node].as.transform.matrix], bounds);
+        pl_bounds_through(&w->program->transforms[w->program->nodes[l->node].as.transform.matrix], false, bounds);
         break;
     case PL_NODE_TRANSFORM_CODE: {
         const pl_range_map *map = (const pl_range_map *)w->maps.data + l->map;

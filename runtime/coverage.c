@@ -69,7 +69,7 @@ struct pl_coverage {
 };
 
 /* The nearest of the directions: along the largest of |d|, its two largest or all three. */
-static int direction_of(const double d[3])
+int pl_coverage_direction(const double d[3])
 {
     const double x = fabs(d[0]), y = fabs(d[1]), z = fabs(d[2]);
     const int least = x <= y && x <= z ? 0 : y <= z ? 1 : 2, most = x >= y && x >= z ? 0 : y >= z ? 1 : 2;
@@ -174,7 +174,7 @@ typedef struct bundle {
 } bundle;
 
 /* Unit vectors along a direction and across it. */
-static void make_frame(int direction, double s[3], double a[3], double b[3])
+void pl_coverage_frame(int direction, double s[3], double a[3], double b[3])
 {
     double square = 0.0, norm = 0.0;
     for (int axis = 0; axis < 3; axis++) s[axis] = directions[direction][axis], square += s[axis] * s[axis];
@@ -214,7 +214,7 @@ static uint64_t make_bundle(const pl_states *states, uint32_t state, int index, 
     const uint64_t key = pl_mix(state, (uint64_t)index);
     uint64_t met = 0;
     double s[3], a[3], b[3];
-    make_frame(direction, s, a, b);
+    pl_coverage_frame(direction, s, a, b);
     const double p = TURN * ((at % bundles + pl_unit(pl_mix(key, 2 * RAYS))) / bundles - 0.5);
     const double q = TURN * (((double)(at / bundles) + pl_unit(pl_mix(key, 2 * RAYS + 1))) / bundles - 0.5);
     const double wide = half_width(box, a), high = half_width(box, b);
@@ -286,7 +286,7 @@ static bool send(const pl_states *states, const double middle[3], const parts *a
         double d[3];
         pl_affine_vector(&p->to_object, rays->d, d);
         const bool enters = p->item->kind == PL_NODE_ENTER;
-        meeting m = {enters ? p->item->what : 0, index, 0, (uint8_t)direction_of(d)};
+        meeting m = {enters ? p->item->what : 0, index, 0, (uint8_t)pl_coverage_direction(d)};
         for (int y = low; y <= high; y++)
             for (int x = left; x <= right; x++) {
                 const int ray = y * SIDE + x;
@@ -465,7 +465,7 @@ static const shares *shares_of(const pl_states *states, uint32_t state)
 double pl_coverage_of(const pl_states *states, uint32_t state, const double d[3])
 {
     const shares *s = shares_of(states, state);
-    return s ? s->by[direction_of(d)] : -1.0;
+    return s ? s->by[pl_coverage_direction(d)] : -1.0;
 }
 
 double pl_coverage_most(const pl_states *states, uint32_t state)

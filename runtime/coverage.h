@@ -19,6 +19,10 @@ void pl_coverage_free(pl_coverage *coverage);
 /* The share of a state's silhouette that is covered from a direction of its frame; below 0: no memory. */
 double pl_coverage_of(const pl_states *states, uint32_t state, const double d[3]);
 
+/* Which of the directions is the nearest, and its unit vector s, with a and b across it. */
+int pl_coverage_direction(const double d[3]);
+void pl_coverage_frame(int direction, double s[3], double a[3], double b[3]);
+
 /* The largest share from any direction; below 0: no memory. */
 double pl_coverage_most(const pl_states *states, uint32_t state);
 

@@ -21,25 +21,25 @@ static pl_span clip(const pl_box *box, const double o[3], const double d[3], dou
     return within;
 }
 
-static pl_span span_with_room(const pl_state *s, const double o[3], const double d[3], double slack, pl_span within)
+static pl_span span_with_room(const pl_box *box, double diameter, const double o[3], const double d[3], double slack,
+                              pl_span within)
 {
-    return clip(&s->box, o, d, ROOM_SLACK * slack + ROOM_SIZE * s->diameter, within);
+    return clip(box, o, d, ROOM_SLACK * slack + ROOM_SIZE * diameter, within);
 }
 
 pl_span pl_span_in(const pl_states *states, uint32_t state, const double o[3], const double d[3], pl_span within)
 {
     const pl_state *s = &states->list[state];
-    return span_with_room(s, o, d, pl_reach_slack(&s->gate, o), within);
+    return span_with_room(&s->box, s->diameter, o, d, pl_reach_slack(&s->gate, o), within);
 }
 
-pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], const double d[3], double stretch,
+pl_gate pl_gate_at(const pl_gate_box *s, const double o[3], const double d[3], double stretch,
                    const pl_footprint *footprint, pl_span within, double t_min, double t_max, double *t_entry,
                    pl_span *inside)
 {
-    const pl_state *s = &states->list[state];
-    double slack = pl_reach_slack(&s->gate, o);
+    double slack = pl_reach_slack(&s->reach, o);
     if (s->unbounded) {
-        *inside = span_with_room(s, o, d, slack, within);
+        *inside = span_with_room(&s->box, s->diameter, o, d, slack, within);
         return PL_GATE_OPEN;
     }
     if (pl_box_is_empty(&s->box)) return PL_GATE_MISSED;
@@ -48,11 +48,20 @@ pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], c
     if (!(own.enter <= own.leave && own.enter <= t_max)) return PL_GATE_MISSED;
     bool small = s->diameter * stretch <= footprint->width + footprint->spread * own.enter;
     if (!small && !(s->endless && s->diameter <= PL_CUT_BLUR * slack)) {
-        *inside = span_with_room(s, o, d, slack, within);
+        *inside = span_with_room(&s->box, s->diameter, o, d, slack, within);
         return PL_GATE_OPEN;
     }
     /* From within, and within the footprint that a ray starts from, nothing is told of the box's sides. */
     return own.enter > t_min && own.enter > footprint->skip ? PL_GATE_CUT : PL_GATE_MISSED;
+}
+
+pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], const double d[3], double stretch,
+                   const pl_footprint *footprint, pl_span within, double t_min, double t_max, double *t_entry,
+                   pl_span *inside)
+{
+    const pl_state *s = &states->list[state];
+    const pl_gate_box box = {s->box, s->gate, s->diameter, s->unbounded, s->endless};
+    return pl_gate_at(&box, o, d, stretch, footprint, within, t_min, t_max, t_entry, inside);
 }
 
 uint64_t pl_cut_hash(uint64_t hash, const uint32_t *terms, uint32_t count)

@@ -46,7 +46,19 @@ typedef struct pl_span {
 
 typedef enum pl_gate { PL_GATE_MISSED, PL_GATE_OPEN, PL_GATE_CUT } pl_gate;
 
-/* stretch: the product of the stretches on the path. within: the span above, at first that of the whole scene's box
+/* What a gate knows of an instance. */
+typedef struct pl_gate_box {
+    pl_box box;
+    pl_reach reach;
+    double diameter;
+    bool unbounded, endless;
+} pl_gate_box;
+
+pl_gate pl_gate_at(const pl_gate_box *box, const double o[3], const double d[3], double stretch,
+                   const pl_footprint *footprint, pl_span within, double t_min, double t_max, double *t_entry,
+                   pl_span *inside);
+
+/* The same for a shared state. stretch: the product of the stretches on the path. within: the span above, at first that of the whole scene's box
  * (pl_span_in of state 0) within the ray's t_min and INFINITY.
  * t_max only saves work. Where the gate is open, *inside is the span for what stands below. */
 pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], const double d[3], double stretch,

@@ -25,9 +25,10 @@ double pl_largest_stretch(const pl_affine *map)
         for (int c = 0; c < 3; c++) scale = fmax(scale, fabs(map->m[4 * r + c]));
     if (scale == 0.0 || !isfinite(scale)) return scale;
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
+        for (int j = i; j < 3; j++) {
             s[i][j] = 0.0;
             for (int r = 0; r < 3; r++) s[i][j] += (map->m[4 * r + i] / scale) * (map->m[4 * r + j] / scale);
+            s[j][i] = s[i][j];
         }
     /* Convergence is quadratic; what is left beside the diagonal is then lost in the factor below. */
     for (int sweep = 0; sweep < 8; sweep++) {

@@ -154,31 +154,51 @@ static uint64_t generated(const pl_states *states)
     return root->primitives == UINT64_MAX ? UINT64_MAX : root->primitives - own;
 }
 
-/* More states than this aren't built but unfolded when rays come to them. */
-enum { MOST_STATES = 1 << 17 };
+/* More states than this aren't built but unfolded when rays come to them; with a cut-off the first number counts, in all
+ * accelerators, and their gates are then those of classes (cut.h). */
+enum { MOST_STATES_CUT = 1 << 14, MOST_STATES = 1 << 17 };
 
 /* PX of an endless scene unless something else is asked for. */
 #define ENDLESS_DETAIL 0.5
+
+/* Gates of classes: states aren't needed, but by none of the accelerators that use them. */
+static bool gate_by_classes(pl_scene *scene, pl_error *error)
+{
+    scene->accel = scene->accel == &pl_accel_bvh ? &pl_accel_lazy : &pl_accel_none;
+    scene->detail = scene->options.detail;
+    scene->gates = pl_classes_create(scene->program, scene->meshes, pl_lazy_budget(scene) / 4, error);
+    scene->covers = scene->gates ? pl_covers_create(scene->program, scene->meshes, scene->gates, error) : NULL;
+    return scene->covers != NULL;
+}
+
+/* Where a scene has too many states or there is no room for them. */
+static bool is_limit_of_states(const pl_error *error)
+{
+    return error->code == PL_ERROR_LIMIT && strcmp(error->place, "states") == 0;
+}
 
 /* The states, where the accelerator or a cut-off needs them. Without either they are explored all the same, since an endless
  * scene has a cut-off in every accelerator; what is wrong with a finite one is then met while tracing. */
 static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
 {
     pl_states *states = &scene->states;
-    pl_error ignored = {.code = PL_OK};
+    pl_error failed = {.code = PL_OK};
     const double asked = scene->options.detail;
-    const bool needed = scene->accel->states || asked > 0.0, may_be_lazy = scene->accel == &pl_accel_bvh && !(asked > 0.0);
-    if (may_be_lazy && !scene->options.front_items && pl_terrains_build(scene)) {
+    const bool cut = asked > 0.0, lazy = scene->accel == &pl_accel_bvh;
+    const bool needed = scene->accel->states || cut;
+    if (lazy && !cut && !scene->options.front_items && pl_terrains_build(scene)) {
         scene->accel = &pl_accel_terrain;
         return true;
     }
-    if (!pl_states_build(states, scene->program, scene->meshes, scene->accel->node_boxes, limit,
-                         may_be_lazy || !needed ? MOST_STATES : 0, needed && !may_be_lazy ? error : &ignored)) {
-        if (may_be_lazy && ignored.code == PL_ERROR_LIMIT && strcmp(ignored.place, "states") == 0) {
+    const uint32_t most = cut ? MOST_STATES_CUT : lazy || !needed ? MOST_STATES : 0;
+    if (!pl_states_build(states, scene->program, scene->meshes, scene->accel->node_boxes && !cut, limit, most, &failed)) {
+        if (cut && is_limit_of_states(&failed) && strncmp(failed.reason, "more than", 9) == 0)
+            return gate_by_classes(scene, error);
+        if (lazy && !cut && is_limit_of_states(&failed)) {
             scene->accel = &pl_accel_lazy;
             return true;
         }
-        if (may_be_lazy) *error = ignored;
+        if (needed) *error = failed;
         return !needed;
     }
     const bool endless = states->list[0].endless;
@@ -186,7 +206,7 @@ static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
         pl_states_free(states);
         return true;
     }
-    scene->detail = asked > 0.0 ? asked : asked == 0.0 && endless ? ENDLESS_DETAIL : 0.0;
+    scene->detail = cut ? asked : asked == 0.0 && endless ? ENDLESS_DETAIL : 0.0;
     states->cuts = endless || scene->detail > 0.0;
     /* A voxel's state is entered without the gates above it, which count where there are cut-offs. */
     if (states->cuts && scene->accel == &pl_accel_grid) scene->accel = &pl_accel_boxes;
@@ -281,6 +301,8 @@ void pl_scene_destroy(pl_scene *scene)
     if (!scene) return;
     if (scene->accel->destroy) scene->accel->destroy(scene);
     pl_states_free(&scene->states);
+    pl_covers_free(scene->covers);
+    pl_classes_free(scene->gates);
     if (scene->program) {
         for (uint32_t i = 0; scene->meshes && i < scene->program->mesh_count; i++) pl_mesh_tree_free(scene->meshes[i]);
         for (uint32_t i = 0; scene->rule_places && i < scene->program->rule_count; i++) free(scene->rule_places[i]);

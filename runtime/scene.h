@@ -4,6 +4,7 @@
 
 #include <pthread.h>
 
+#include "class.h"
 #include "shapes/mesh.h"
 #include "state.h"
 #include "trace.h"
@@ -14,6 +15,8 @@ struct pl_scene {
     pl_program *program;
     pl_mesh_tree **meshes;
     pl_states states; /* empty where the accelerator needs none */
+    pl_classes *gates; /* a cut-off applies, and there are too many states: gates are those of classes (cut.h); else NULL */
+    pl_covers *covers; /* of the same classes */
     const pl_accel *accel;
     void *structure; /* the accelerator's */
     size_t mesh_bytes;

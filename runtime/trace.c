@@ -71,7 +71,7 @@ static void begin_query(pl_query *query, pl_tracer *tracer, const pl_ray *ray, p
     query->found = query->done = false;
     query->tracer = tracer;
     query->error = error;
-    if (!tracer->scene->states.cuts) return;
+    if (!tracer->scene->states.cuts && !tracer->scene->gates) return;
     const double px = tracer->scene->detail;
     query->length = sqrt(pl_dot(ray->direction, ray->direction));
     query->footprint = (pl_footprint){px * ray->width, px * ray->spread, px * ray->width / query->length};
@@ -82,6 +82,7 @@ uint64_t pl_trace_primitive(pl_tracer *tracer, const pl_hit *hit)
 {
     const pl_scene *scene = tracer->scene;
     uint64_t primitive = 0;
+    if (scene->gates) return hit->primitive;
     if (scene->accel->node_boxes || (scene->states.cuts && !scene->accel->items))
         return pl_states_locate(&scene->states, &hit->path, hit->cut_depth);
     if (!scene->accel->items) return hit->primitive;
@@ -144,8 +145,10 @@ unsigned pl_trace_nearest_many(pl_tracer *tracer, const pl_ray *rays, unsigned c
 
 bool pl_trace_number(pl_tracer *tracer, pl_hit *hit, pl_error *error)
 {
-    const pl_accel *accel = tracer->scene->accel;
-    return !accel->number || hit->t == INFINITY || accel->number(tracer, hit, error);
+    const pl_scene *scene = tracer->scene;
+    if (hit->t == INFINITY) return true;
+    if (scene->gates) return pl_number_by_classes(tracer, scene->gates, hit, error);
+    return !scene->accel->number || scene->accel->number(tracer, hit, error);
 }
 
 int pl_trace_any(pl_tracer *tracer, const pl_ray *ray, pl_error *error)

@@ -10,7 +10,7 @@
 #ifndef PL_ACCEL_H
 #define PL_ACCEL_H
 
-#include "../cut.h"
+#include "../class.h"
 #include "../scene.h"
 
 /* Steps that one ray may take: entries of bvh's stack; nodes of a walk. Far beyond any ray that makes sense, it ends
@@ -76,6 +76,13 @@ static inline pl_gate pl_query_gate(const pl_query *query, const pl_states *stat
 /* Offers a cut instance's box; leaf: path, source and primitive. false: an error. */
 bool pl_query_cut(pl_query *query, const pl_states *states, const pl_arrival *at, uint64_t hash, double t_entry,
                   const pl_leaf *leaf);
+
+/* The same where gates are those of classes: coverage is the instance's (pl_covers_of). */
+bool pl_query_cut_box(pl_query *query, const pl_gate_box *box, double coverage, const pl_arrival *at, uint64_t hash,
+                      double t_entry, const pl_leaf *leaf);
+
+/* Finds the index of a hit's primitive by the derivation up to it, without what classes can count. */
+bool pl_number_by_classes(pl_tracer *tracer, pl_classes *classes, pl_hit *hit, pl_error *error);
 
 struct pl_accel {
     const char *name;

@@ -23,8 +23,12 @@ enum { PINNED = 16 };
 typedef struct frame {
     pl_lazy_state *state; /* NULL: not pinned any more */
     uint32_t symbol, terms; /* terms on the path up to here */
+    uint32_t item;          /* of the frame before, by which this one was reached */
     size_t scope;           /* in `scopes`: what the state is found by again */
     double o[3], d[3];
+    double stretch; /* with cut-offs: the product of stretches, the hash of the path and the span (cut.h) */
+    uint64_t hash;
+    pl_span inside;
 } frame;
 
 typedef struct pending {
@@ -103,8 +107,9 @@ static bool push_items(work *w, uint32_t index, pl_query *query, pl_counters *co
         if (query->shadow && it->item.no_shadow) continue;
         if (!it->unbounded) {
             counters->box_tests++;
-            if (pl_box_is_empty(&it->box)) continue;
-            if (!pl_slab_hits(&slab, &it->box, query->t_min, query->t_max, &t_entry)) {
+            const pl_box box = pl_lazy_box(it);
+            if (pl_box_is_empty(&box)) continue;
+            if (!pl_slab_hits(&slab, &box, query->t_min, query->t_max, &t_entry)) {
                 if (index > counters->miss_depth) counters->miss_depth = index;
                 continue;
             }
@@ -138,10 +143,18 @@ static bool keep_scope(work *w, const uint64_t *scope, size_t *place, pl_error *
 static const pl_lazy_state *pin(pl_tracer *tracer, frame *f, pl_error *error)
 {
     work *w = tracer->work;
+    bool is_new;
     if (!f->state)
         f->state = pl_lazy_get(tracer->scene->structure, w->unfolder, f->symbol,
-                               f->symbol == UINT32_MAX ? NULL : w->scopes + f->scope, &w->spent, error);
+                               f->symbol == UINT32_MAX ? NULL : w->scopes + f->scope, &w->spent, &is_new, error);
     return f->state;
+}
+
+/* The last frame's state is new: what is known of its items is known of those above. */
+static void shrink(work *w)
+{
+    for (size_t i = w->frame_count - 1; i > 0 && w->frames[i].state && w->frames[i - 1].state; i--)
+        if (!pl_lazy_shrink(&w->frames[i - 1].state->items[w->frames[i].item], w->frames[i].state)) return;
 }
 
 /* Goes into an instance whose ray stands in f; terms: of the path to it. */
@@ -149,6 +162,7 @@ static bool enter(pl_tracer *tracer, uint32_t symbol, const uint64_t *scope, con
 {
     work *w = tracer->work;
     frame f = *as;
+    bool is_new;
     if (w->frame_count > PL_LIMIT_DEPTH)
         return pl_fail_at(query->error, PL_ERROR_LIMIT, tracer->scene->program, symbol,
                           "depth: a ray came %d symbols deep, which is the limit; does the recursion end?", PL_LIMIT_DEPTH);
@@ -156,10 +170,12 @@ static bool enter(pl_tracer *tracer, uint32_t symbol, const uint64_t *scope, con
         !keep_scope(w, scope, &f.scope, query->error))
         return false;
     f.symbol = symbol;
-    f.state = pl_lazy_get(tracer->scene->structure, w->unfolder, symbol, scope, &w->spent, query->error);
+    f.state = pl_lazy_get(tracer->scene->structure, w->unfolder, symbol, scope, &w->spent, &is_new, query->error);
     if (!f.state) return false;
     if (w->frame_count >= PINNED) leave(&w->frames[w->frame_count - PINNED]);
     w->frames[w->frame_count++] = f;
+    /* With a cut-off an instance may be drawn as its whole box, however little stands in it. */
+    if (is_new && !tracer->scene->gates) shrink(w);
     if (w->spent > MOST_WORK)
         return fail_work(tracer->scene, symbol, "needed to visit more nodes of the graph than", MOST_WORK, query->error);
     return push_items(w, (uint32_t)w->frame_count - 1, query, &tracer->counters);
@@ -181,6 +197,25 @@ static bool extend_path(work *w, const pl_item *item, pl_error *error)
     return true;
 }
 
+/* The gate of an instance whose ray stands in f, with the stretch above it. */
+static pl_gate pass_gate(pl_tracer *tracer, const pl_lazy_item *it, frame *f, pl_query *query, bool *ok)
+{
+    const work *w = tracer->work;
+    const pl_item *item = &it->item;
+    for (uint32_t i = 0; i < item->transform_count; i++) f->stretch *= item->transforms[i]->stretch;
+    pl_arrival at = {0, f->o, f->d, f->stretch, f->inside, (uint32_t)w->frame_count};
+    double t_entry;
+    pl_gate gate = pl_gate_at(it->gate, f->o, f->d, f->stretch, &query->footprint, f->inside, query->t_min, query->t_max,
+                              &t_entry, &f->inside);
+    if (gate == PL_GATE_MISSED) return gate;
+    f->hash = pl_cut_hash(f->hash, item->terms, item->term_count);
+    if (gate == PL_GATE_OPEN || !(t_entry < query->t_max)) return gate;
+    pl_leaf leaf = {.path = write_path, .source = w};
+    double coverage = pl_lazy_coverage(w->unfolder, item->what, it->scope, f->d);
+    *ok = pl_query_cut_box(query, it->gate, coverage, &at, f->hash, t_entry, &leaf);
+    return gate;
+}
+
 /* An item of the last frame. */
 static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
 {
@@ -191,13 +226,15 @@ static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
     if (!state) return false;
     const pl_lazy_item *it = &state->items[at->item];
     const pl_item *item = &it->item;
-    frame f = {.state = NULL};
-    memcpy(f.o, parent->o, sizeof f.o);
-    memcpy(f.d, parent->d, sizeof f.d);
+    bool ok = true;
+    frame f = *parent;
+    f.state = NULL;
+    f.item = at->item;
     for (uint32_t i = 0; i < item->transform_count; i++) pl_map_ray(item->transforms[i], f.o, f.d);
     if (!extend_path(w, item, query->error)) return false;
     f.terms = w->path.length;
     if (item->kind == PL_NODE_ENTER) {
+        if (it->gate && pass_gate(tracer, it, &f, query, &ok) != PL_GATE_OPEN) return ok;
         if (it->unbounded && ++w->unknown > MOST_UNKNOWN)
             return fail_work(scene, item->what, "entered more instances of unknown size than", MOST_UNKNOWN, query->error);
         return enter(tracer, item->what, it->scope, &f, query);
@@ -214,7 +251,7 @@ static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
 static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
 {
     work *w = tracer->work;
-    frame root = {.state = NULL};
+    frame root = {.stretch = 1.0, .inside = {query->t_min, INFINITY}};
     memcpy(root.o, ray->origin, sizeof root.o);
     memcpy(root.d, ray->direction, sizeof root.d);
     w->stack_count = w->path.length = w->unknown = 0;
@@ -231,55 +268,14 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     return ok;
 }
 
-/* Whether the walk stands before the path, and not above it. */
-static bool is_before(const pl_walk *walk, const pl_path *path)
-{
-    for (uint32_t i = 0; i < walk->at.terms && i < path->length; i++)
-        if (walk->path.terms[i] != path->terms[i]) return true;
-    return false;
-}
-
-/* The primitive's index: the derivation up to it, without what classes can count. */
 static bool number(pl_tracer *tracer, pl_hit *hit, pl_error *error)
 {
-    const pl_program *program = tracer->scene->program;
-    pl_walk *walk = &tracer->walk;
-    walk->follow = NULL;
-    pl_walk_restart(walk, 0, NULL);
-    uint64_t index = 0, spent = 0;
-    for (;;) {
-        pl_bounds bounds;
-        if (++spent > MOST_WORK)
-            return fail_work(tracer->scene, walk->node, "to number its primitive needed to visit more nodes than", MOST_WORK,
-                             error);
-        switch (pl_walk_next(walk, error)) {
-        case PL_EVENT_ERROR: return false;
-        case PL_EVENT_END: hit->primitive = UINT64_MAX; return true;
-        case PL_EVENT_ENTER:
-            if (!is_before(walk, &hit->path)) break;
-            pl_classes_bound(pl_lazy_classes(tracer->scene->structure), program->nodes[walk->node].as.enter.symbol,
-                             &walk->scope, &bounds, &spent);
-            if (bounds.count == UINT64_MAX) break;
-            index += bounds.count;
-            pl_walk_prune(walk);
-            break;
-        case PL_EVENT_PRIMITIVE:
-        case PL_EVENT_MESH:
-            if (!is_before(walk, &hit->path) && walk->at.terms == hit->path.length) {
-                hit->primitive = index;
-                return true;
-            }
-            index++;
-            break;
-        default: break;
-        }
-    }
+    return pl_number_by_classes(tracer, pl_lazy_classes(tracer->scene->structure), hit, error);
 }
 
 static bool build(pl_scene *scene, pl_error *error)
 {
-    size_t limit = scene->memory, base = scene->program->bytes + scene->mesh_bytes;
-    scene->structure = pl_lazy_cache_create(scene, limit > base ? limit - base : 0, error);
+    scene->structure = pl_lazy_cache_create(scene, pl_lazy_budget(scene), error);
     return scene->structure != NULL;
 }
 

@@ -18,12 +18,19 @@
 #include "../class.h"
 #include "accel.h"
 
+/* A box that shrinks while others read it, as more is learnt of what it holds: each plane holds by itself, so whatever mixture
+ * of old and new planes is read does. */
+typedef struct pl_shrinking_box {
+    _Atomic double lo[3], hi[3];
+} pl_shrinking_box;
+
 typedef struct pl_lazy_item {
     pl_item item; /* of an enter item, `what` is the symbol's node */
-    pl_box box;   /* in the state's frame */
+    pl_shrinking_box *box; /* in the state's frame */
     pl_reach reach;
     bool unbounded;
     const uint64_t *scope; /* of an enter item: packed, as it is there */
+    const pl_gate_box *gate; /* of an enter item, with cut-offs; else NULL */
 } pl_lazy_item;
 
 typedef struct pl_lazy_state {
@@ -38,8 +45,24 @@ typedef struct pl_lazy_state {
     const pl_lazy_item *items;
 } pl_lazy_state;
 
+static inline pl_box pl_lazy_box(const pl_lazy_item *item)
+{
+    pl_box box;
+    for (int axis = 0; axis < 3; axis++) {
+        box.lo[axis] = atomic_load_explicit(&item->box->lo[axis], memory_order_relaxed);
+        box.hi[axis] = atomic_load_explicit(&item->box->hi[axis], memory_order_relaxed);
+    }
+    return box;
+}
+
+/* A state was unfolded by way of an item: its items' boxes bound the item's. Returns whether that made it much smaller. */
+bool pl_lazy_shrink(const pl_lazy_item *item, const pl_lazy_state *state);
+
 typedef struct pl_lazy_cache pl_lazy_cache;
 typedef struct pl_unfolder pl_unfolder; /* a thread's working memory */
+
+/* What a scene's budget leaves for states and classes. */
+size_t pl_lazy_budget(const pl_scene *scene);
 
 pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_error *error);
 void pl_lazy_cache_free(pl_lazy_cache *cache);
@@ -48,10 +71,13 @@ pl_unfolder *pl_unfolder_create(const pl_scene *scene, pl_error *error);
 void pl_unfolder_free(pl_unfolder *unfolder);
 
 /* The state that a packed scope leads to at a symbol (UINT32_MAX, NULL: the scene itself), pinned. NULL: an error. *work grows
- * by the nodes that were visited to unfold it and to bound what it consists of. */
+ * by the nodes that were visited to unfold it and to bound what it consists of; is_new: it was unfolded. */
 pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_unfolder *unfolder, uint32_t symbol, const uint64_t *scope,
-                           uint64_t *work, pl_error *error);
+                           uint64_t *work, bool *is_new, pl_error *error);
 void pl_lazy_release(pl_lazy_state *state);
+
+/* The coverage (cut.h) of the state that a packed scope leads to at a symbol, from a direction of its frame. */
+double pl_lazy_coverage(pl_unfolder *unfolder, uint32_t symbol, const uint64_t *scope, const double d[3]);
 
 typedef struct pl_lazy_counts {
     uint64_t states, bytes, found, unfolded, evicted, classes, classes_emptied, classes_visited;

@@ -30,6 +30,8 @@ struct pl_lazy_cache {
 /* Growing arrays of what is being unfolded; a draft refers to them by index. */
 typedef struct draft {
     pl_lazy_item it;
+    pl_box box;
+    pl_gate_box gate;
     size_t transform_first, term_first, scope_first, scope_count;
 } draft;
 
@@ -44,6 +46,7 @@ struct pl_unfolder {
     pl_scope scope;
     growing drafts, chain, transforms, computed, terms, scopes, key;
     uint64_t work;
+    size_t entered; /* drafts of states */
 };
 
 /* A transformation of the current path: constant, or one of `computed`. */
@@ -78,7 +81,10 @@ pl_unfolder *pl_unfolder_create(const pl_scene *scene, pl_error *error)
         u->scopes.element = u->key.element = sizeof(uint64_t);
         u->scope.parameters = malloc((scene->program->parameter_count + 1) * sizeof(double));
     }
-    if (u && u->scope.parameters && pl_walk_begin(&u->walk, scene->program, 0, NULL, error)) return u;
+    if (u && u->scope.parameters && pl_walk_begin(&u->walk, scene->program, 0, NULL, error)) {
+        u->walk.stretches = scene->gates != NULL;
+        return u;
+    }
     pl_unfolder_free(u);
     pl_fail_memory(error, "preparing to unfold");
     return NULL;
@@ -123,6 +129,8 @@ static void bound(pl_unfolder *u, pl_classes *classes, draft *d)
     const pl_item *item = &d->it.item;
     if (item->kind == PL_NODE_ENTER) {
         pl_classes_bound(classes, item->what, &u->walk.scope, &bounds, &u->work);
+        d->gate = pl_bounds_gate(&bounds);
+        if (u->scene->gates) bounds.reach = d->gate.reach;
     } else if (item->kind == PL_NODE_MESH) {
         pl_bounds_of_leaf(pl_mesh_box(u->scene->meshes[item->what]), false, &bounds);
     } else {
@@ -130,9 +138,10 @@ static void bound(pl_unfolder *u, pl_classes *classes, draft *d)
         pl_box box = shape->support ? pl_shape_box(shape, item->arguments, NULL) : pl_box_everything();
         pl_bounds_of_leaf(&box, !shape->support, &bounds);
     }
+    const bool whole = u->scene->gates && item->kind == PL_NODE_ENTER;
     for (size_t i = item->transform_count; i-- > 0;)
-        pl_bounds_through(link_transform(u, (const link_ *)u->chain.data + i), &bounds);
-    d->it.box = bounds.box;
+        pl_bounds_through(link_transform(u, (const link_ *)u->chain.data + i), whole, &bounds);
+    d->box = bounds.box;
     d->it.reach = bounds.reach;
     d->it.unbounded = bounds.unbounded;
 }
@@ -155,6 +164,7 @@ static bool add_draft(pl_unfolder *u, pl_classes *classes, uint8_t kind, uint32_
     if (!transforms || !terms) return false;
     if (d.it.item.transform_count) memcpy(transforms, u->chain.data, d.it.item.transform_count * sizeof *transforms);
     if (d.it.item.term_count) memcpy(terms, walk->path.terms, d.it.item.term_count * sizeof *terms);
+    u->entered += kind == PL_NODE_ENTER;
     if (kind == PL_NODE_ENTER) {
         d.scope_count = pl_scope_words(walk->program, &walk->scope) - walk->scope.draws;
         uint64_t *words = extend(&u->scopes, d.scope_count);
@@ -172,7 +182,7 @@ static bool add_draft(pl_unfolder *u, pl_classes *classes, uint8_t kind, uint32_
 static bool derive(pl_unfolder *u, pl_classes *classes, pl_error *error)
 {
     bool ok = true;
-    u->drafts.count = u->chain.count = u->transforms.count = u->computed.count = u->terms.count = u->scopes.count = 0;
+    u->entered = u->drafts.count = u->chain.count = u->transforms.count = u->computed.count = u->terms.count = u->scopes.count = 0;
     while (ok) {
         u->work += EVENT_WORK;
         switch (pl_walk_next(&u->walk, error)) {
@@ -197,14 +207,18 @@ static pl_lazy_state *assemble(pl_unfolder *u, uint32_t symbol, uint64_t hash)
     size_t drafts = u->drafts.count * sizeof(pl_lazy_item), computed = u->computed.count * sizeof(pl_transform);
     size_t transforms = u->transforms.count * sizeof(pl_transform *), scopes = u->scopes.count * sizeof(uint64_t);
     size_t key = u->key.count * sizeof(uint64_t), terms = u->terms.count * sizeof(uint32_t);
-    size_t bytes = sizeof(pl_lazy_state) + drafts + computed + transforms + scopes + key + terms;
+    size_t gates = u->scene->gates ? u->entered * sizeof(pl_gate_box) : 0;
+    size_t boxes = u->drafts.count * sizeof(pl_shrinking_box);
+    size_t bytes = sizeof(pl_lazy_state) + drafts + boxes + computed + gates + transforms + scopes + key + terms;
     pl_lazy_state *state = malloc(bytes);
     if (!state) return NULL;
     memset(state, 0, sizeof *state);
     char *at = (char *)(state + 1);
     pl_lazy_item *items = (pl_lazy_item *)at;
-    pl_transform *matrices = (pl_transform *)(at += drafts);
-    const pl_transform **list = (const pl_transform **)(at += computed);
+    pl_shrinking_box *box = (pl_shrinking_box *)(at += drafts);
+    pl_transform *matrices = (pl_transform *)(at += boxes);
+    pl_gate_box *gate = (pl_gate_box *)(at += computed);
+    const pl_transform **list = (const pl_transform **)(at += gates);
     uint64_t *words = (uint64_t *)(at += transforms);
     uint64_t *key_words = (uint64_t *)(at += scopes);
     uint32_t *term_list = (uint32_t *)(at + key);
@@ -222,6 +236,15 @@ static pl_lazy_state *assemble(pl_unfolder *u, uint32_t symbol, uint64_t hash)
         items[i].item.transforms = list + d->transform_first;
         items[i].item.terms = term_list + d->term_first;
         items[i].scope = words + d->scope_first;
+        items[i].box = &box[i];
+        for (int axis = 0; axis < 3; axis++) {
+            atomic_init(&box[i].lo[axis], d->box.lo[axis]);
+            atomic_init(&box[i].hi[axis], d->box.hi[axis]);
+        }
+        if (gates && d->it.item.kind == PL_NODE_ENTER) {
+            *gate = d->gate;
+            items[i].gate = gate++;
+        }
         if (!d->it.unbounded) pl_reach_join(&state->reach, &d->it.reach);
     }
     state->hash = hash;
@@ -236,7 +259,47 @@ static pl_lazy_state *assemble(pl_unfolder *u, uint32_t symbol, uint64_t hash)
     return state;
 }
 
+double pl_lazy_coverage(pl_unfolder *u, uint32_t symbol, const uint64_t *scope, const double d[3])
+{
+    pl_scope_unpack(u->scene->program, scope, &u->scope);
+    return pl_covers_of(u->scene->covers, symbol, &u->scope, d);
+}
+
+/* Planes that move by less aren't worth telling those above. */
+#define MUCH 0.02
+
+bool pl_lazy_shrink(const pl_lazy_item *item, const pl_lazy_state *state)
+{
+    pl_box hull = pl_box_empty();
+    for (uint32_t i = 0; i < state->item_count; i++) {
+        pl_box box = pl_lazy_box(&state->items[i]);
+        if (state->items[i].unbounded) return false;
+        pl_box_join(&hull, &box);
+    }
+    for (uint32_t i = item->item.transform_count; i-- > 0;) pl_box_through(item->item.transforms[i], &hull);
+    pl_box old = pl_lazy_box(item);
+    bool much = false;
+    for (int axis = 0; axis < 3; axis++) {
+        const double least = MUCH * (old.hi[axis] - old.lo[axis]);
+        if (hull.lo[axis] > old.lo[axis]) {
+            atomic_store_explicit(&item->box->lo[axis], hull.lo[axis], memory_order_relaxed);
+            much = much || hull.lo[axis] > old.lo[axis] + least;
+        }
+        if (hull.hi[axis] < old.hi[axis]) {
+            atomic_store_explicit(&item->box->hi[axis], hull.hi[axis], memory_order_relaxed);
+            much = much || hull.hi[axis] < old.hi[axis] - least;
+        }
+    }
+    return much;
+}
+
 /* --- the cache --- */
+
+size_t pl_lazy_budget(const pl_scene *scene)
+{
+    const size_t taken = scene->program->bytes + scene->mesh_bytes;
+    return scene->memory > taken ? scene->memory - taken : 0;
+}
 
 pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_error *error)
 {
@@ -251,7 +314,7 @@ pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_erro
         return NULL;
     }
     cache->scene = scene;
-    cache->classes = pl_classes_create(scene->program, scene->meshes, limit / 4, error);
+    cache->classes = scene->gates ? scene->gates : pl_classes_create(scene->program, scene->meshes, limit / 4, error);
     bool ok = cache->classes != NULL;
     cache->shard_count = 1;
     while (cache->shard_count < SHARDS && limit / cache->shard_count > 2 * SHARD_BYTES) cache->shard_count *= 2;
@@ -285,7 +348,7 @@ void pl_lazy_cache_free(pl_lazy_cache *cache)
         free(s->buckets);
         pthread_mutex_destroy(&s->lock);
     }
-    pl_classes_free(cache->classes);
+    if (cache->classes != cache->scene->gates) pl_classes_free(cache->classes);
     free(cache);
 }
 
@@ -366,8 +429,9 @@ static bool make_key(pl_unfolder *u, uint32_t symbol)
 }
 
 pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_unfolder *u, uint32_t symbol, const uint64_t *scope,
-                           uint64_t *work, pl_error *error)
+                           uint64_t *work, bool *is_new, pl_error *error)
 {
+    *is_new = false;
     if (scope) pl_scope_unpack(cache->scene->program, scope, &u->scope);
     bool ok = make_key(u, symbol);
     uint64_t hash = symbol;
@@ -385,6 +449,7 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_unfolder *u, uint32_t symbol
         *work += u->work;
         if (!derived) return NULL;
         pl_lazy_state *state = assemble(u, symbol, hash);
+        *is_new = true;
         if (state) return put(s, state);
     }
     pl_fail_memory(error, "unfolding a state");

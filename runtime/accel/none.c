@@ -15,25 +15,37 @@ static bool walk_path(const void *source, pl_path *path)
 /* What the payload has behind the ray, where there are cut-offs: the product of stretches, and the span (cut.h). */
 enum { STRETCH = 6, ENTER, LEAVE };
 
+/* The gate of the instance at an enter node: that of its state, or of its class. *box is set for the latter. */
+static pl_gate gate_of(const pl_walk *walk, const pl_scene *scene, const pl_query *query, pl_arrival *at, pl_gate_box *box,
+                       double *t_entry, pl_span *inside)
+{
+    const uint32_t symbol = scene->program->nodes[walk->node].as.enter.symbol;
+    if (!scene->gates) {
+        at->state = pl_states_find(&scene->states, symbol, &walk->scope);
+        return pl_query_gate(query, &scene->states, at, t_entry, inside);
+    }
+    pl_classes_gate(scene->gates, symbol, &walk->scope, box);
+    return pl_gate_at(box, at->o, at->d, at->stretch, &query->footprint, at->within, query->t_min, query->t_max, t_entry,
+                      inside);
+}
+
 /* At an enter node: goes on only into instances whose gate is open. */
 static bool pass_gate(pl_walk *walk, const pl_scene *scene, pl_counters *counters, pl_query *query)
 {
-    const pl_states *states = &scene->states;
-    const uint32_t symbol = scene->program->nodes[walk->node].as.enter.symbol;
-    pl_arrival at = {.state = pl_states_find(states, symbol, &walk->scope),
-                     .o = walk->at.payload,
+    pl_arrival at = {.o = walk->at.payload,
                      .d = walk->at.payload + 3,
                      .stretch = walk->at.payload[STRETCH],
                      .within = {walk->at.payload[ENTER], walk->at.payload[LEAVE]},
                      .depth = walk->at.depth + 1};
     double t_entry;
     pl_span inside;
+    pl_gate_box box;
     if (query->shadow && walk->at.no_shadow) {
         pl_walk_prune(walk);
         return true;
     }
     counters->box_tests++;
-    pl_gate gate = pl_query_gate(query, states, &at, &t_entry, &inside);
+    pl_gate gate = gate_of(walk, scene, query, &at, &box, &t_entry, &inside);
     if (gate == PL_GATE_OPEN) {
         walk->at.payload[ENTER] = inside.enter;
         walk->at.payload[LEAVE] = inside.leave;
@@ -45,12 +57,15 @@ static bool pass_gate(pl_walk *walk, const pl_scene *scene, pl_counters *counter
         return true;
     }
     pl_leaf leaf = {.path = walk_path, .source = walk};
-    return pl_query_cut(query, states, &at, pl_cut_hash(0, walk->path.terms, walk->at.terms), t_entry, &leaf);
+    const uint64_t hash = pl_cut_hash(0, walk->path.terms, walk->at.terms);
+    if (!scene->gates) return pl_query_cut(query, &scene->states, &at, hash, t_entry, &leaf);
+    const uint32_t symbol = scene->program->nodes[walk->node].as.enter.symbol;
+    return pl_query_cut_box(query, &box, pl_covers_of(scene->covers, symbol, &walk->scope, at.d), &at, hash, t_entry, &leaf);
 }
 
 bool pl_walk_offer(pl_walk *walk, const pl_scene *scene, pl_counters *counters, pl_query *query, pl_node_test missed)
 {
-    const bool cuts = scene->states.cuts;
+    const bool cuts = scene->states.cuts || scene->gates;
     uint64_t primitive = 0, steps = 0;
     double *o = walk->at.payload, *d = o + 3;
     walk->stretches = cuts;
@@ -92,8 +107,9 @@ bool pl_walk_trace(pl_walk *walk, const pl_scene *scene, pl_counters *counters, 
     memcpy(walk->at.payload, ray->origin, 3 * sizeof(double));
     memcpy(walk->at.payload + 3, ray->direction, 3 * sizeof(double));
     walk->at.payload[STRETCH] = 1.0;
-    if (scene->states.cuts) {
-        pl_span span = pl_span_in(&scene->states, 0, ray->origin, ray->direction, (pl_span){query->t_min, INFINITY});
+    if (scene->states.cuts || scene->gates) {
+        pl_span span = {query->t_min, INFINITY};
+        if (scene->states.cuts) span = pl_span_in(&scene->states, 0, ray->origin, ray->direction, span);
         walk->at.payload[ENTER] = span.enter;
         walk->at.payload[LEAVE] = span.leave;
     }

@@ -145,6 +145,16 @@ bool pl_query_leaf(pl_query *query, const pl_leaf *leaf)
     return true;
 }
 
+static bool keep_cut(pl_query *query, double diameter, const pl_arrival *at, double t_entry, const pl_leaf *leaf)
+{
+    pl_leaf cut = *leaf;
+    cut.o = at->o;
+    cut.d = at->d;
+    cut.cut_depth = at->depth;
+    cut.bound = diameter * at->stretch / query->length;
+    return keep(query, &cut, &(pl_root){t_entry, 0});
+}
+
 bool pl_query_cut(pl_query *query, const pl_states *states, const pl_arrival *at, uint64_t hash, double t_entry,
                   const pl_leaf *leaf)
 {
@@ -152,12 +162,14 @@ bool pl_query_cut(pl_query *query, const pl_states *states, const pl_arrival *at
     const double share = pl_coverage_of(states, at->state, at->d);
     if (share < 0.0) return pl_fail_memory(query->error, "measuring coverages");
     if (!(pl_cut_chance(hash, at->depth, query->ray) < share)) return true;
-    pl_leaf cut = *leaf;
-    cut.o = at->o;
-    cut.d = at->d;
-    cut.cut_depth = at->depth;
-    cut.bound = states->list[at->state].diameter * at->stretch / query->length;
-    return keep(query, &cut, &(pl_root){t_entry, 0});
+    return keep_cut(query, states->list[at->state].diameter, at, t_entry, leaf);
+}
+
+bool pl_query_cut_box(pl_query *query, const pl_gate_box *box, double coverage, const pl_arrival *at, uint64_t hash,
+                      double t_entry, const pl_leaf *leaf)
+{
+    if (!(t_entry < query->t_max) || !(pl_cut_chance(hash, at->depth, query->ray) < coverage)) return true;
+    return keep_cut(query, box->diameter, at, t_entry, leaf);
 }
 
 /* (t, path), then the root's order on its leaf. */

@@ -11,6 +11,7 @@ import pytest
 from plsys.compiler.pipeline import build
 from plsys.compiler.reading.source import Source
 from plsys.runtime import Scene
+from plsys.runtime.errors import PlsysRuntimeError
 
 FOREST = """
 global_settings { assumed_gamma 1.0 seed 3 }
@@ -76,9 +77,45 @@ def test_more_states_than_can_be_built_are_unfolded_on_touch():
             np.testing.assert_array_equal(ours, expected, err_msg=name)
 
 
+@pytest.mark.parametrize("px", [0.7, 3.0])
+def test_cut_offs_are_the_same_in_every_accelerator_and_budget(px):
+    """256 trees, no two alike, more states than are built: gates are those of classes, wherever they are asked."""
+    data = forest(4, 7)
+    expected, counts = picture(data, accelerator="none", detail=px, threads=2)
+    assert counts["cut"]["instances"] > 0
+    for options in ({"memory": 24_000_000, "threads": 2}, {"threads": 1}, {"accelerator": "boxes"}, {"accelerator": "grid"}):
+        found, counts = picture(data, detail=px, **options)
+        for name, values in expected.items():
+            np.testing.assert_array_equal(found[name], values, err_msg=f"{options} {name}")
+        assert ("accelerator" in options) != (counts["lazy"]["unfolded"] > 0)
+
+
+def test_a_cut_off_keeps_what_a_forest_covers_and_unfolds_less():
+    data = forest(4, 7)
+
+    def seen(**options):
+        with Scene(data, memory=30_000_000, **options) as scene:
+            depth = scene.render(120, 90, channels=("depth",))["depth"]
+            return np.isfinite(depth).mean(), scene.statistics
+
+    whole, all_of_it = seen()
+    for px, off in ((1.0, 0.05), (4.0, 0.1)):
+        share, counts = seen(detail=px)
+        assert share == pytest.approx(whole, rel=off)
+        assert 0 < counts["cut"]["max_error"] < px
+        assert counts["lazy"]["unfolded"] < all_of_it["lazy"]["unfolded"]
+
+
+def test_a_cut_off_in_too_small_a_budget_names_the_need():
+    """Whether there are too many states mustn't depend on the budget, so there has to be room to find out."""
+    with pytest.raises(PlsysRuntimeError, match="memory: .* states need more than"):
+        picture(forest(4, 7), detail=1.0, memory=400_000)
+
+
 PROBE = """
 import resource, sys
 from plsys.runtime import Scene
+from plsys.runtime.errors import PlsysRuntimeError
 data, memory = open(sys.argv[1], "rb").read(), int(sys.argv[2])
 with Scene(data, memory=memory or None, threads=1) as scene:
     scene.render(64, 48)
