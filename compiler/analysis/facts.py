@@ -91,7 +91,7 @@ class Facts:
             {(name.start, name.end): name for name in found if name.name}.values(), key=lambda n: n.start
         )
 
-    @property
+    @cached_property
     def is_broken(self) -> bool:
         return any(item.severity == "error" for item in self.syntax)
 

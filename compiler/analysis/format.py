@@ -42,8 +42,8 @@ def format_document(document: Document, start: int = 0, end: int | None = None) 
     line_end = line_end_of(document)
     edits: list[Edit] = []
     skipped = []
-    for index in range(first, last + 1):
-        block, base = text.blocks[index], text.starts[index]
+    blocks = zip(text.blocks[first : last + 1], text.starts[first:])
+    for index, (block, base) in enumerate(blocks, first):
         if facts_of(block).is_broken:
             skipped.append(block)
             continue

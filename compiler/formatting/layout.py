@@ -17,14 +17,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from .spacing import Gap, is_fixed, spaces
-from .tokens import INDENT, LINE_END, Token, tokens_of
+from .tokens import INDENT, LINE_END, tokens_of
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-
-_BRACKETS = frozenset(("{", "[", "(", "<", "< ", "}", "]", ")", ">"))
 
 
 class Edit(NamedTuple):
@@ -45,7 +43,6 @@ class _Bracket:
     width_after: int = 0
     unit: int | None = None
     breaks: bool = False  # a line breaks after the opener
-    is_empty: bool = True
 
 
 def apply(data: bytes, edits: list[Edit]) -> bytes:
@@ -66,63 +63,62 @@ def format_tree(
 
 
 class _Layout:
-    """Goes through the tokens once. Most gaps are as they should be and depend on nothing but the two tokens, so the loop
-    in ``run`` is short for those."""
+    """Goes through the tokens that something follows from. Most gaps are as they should be and depend on nothing but the two
+    tokens, and most tokens mean nothing for those after them: these are left out first."""
 
     def __init__(self, text: bytes, root: Node, line_end: bytes) -> None:
         self.text, self.line_end = text, line_end
         found = tokens_of(root, text)
-        self.tokens, self.units, self.anchors = found.items, found.units, found.anchors
-        self.columns = dict.fromkeys(
-            found.anchors.values(), 0
-        )  # where the operands stand that others align with
-        self.open = [_Bracket(0, 0, is_empty=False)]
+        self.roles, self.starts, self.ends = zip(*found.items) if found.items else ((), (), ())
+        self.units, self.anchors = found.units, found.anchors
+        # where the operands stand that others align with
+        self.columns = dict.fromkeys(found.anchors.values(), 0)
+        self.open = [_Bracket(0, 0)]
         self.edits: list[Edit] = []
         self.indent = 0  # of the line that is being laid out
         self.line_start = 0  # where the author's line starts, behind its indentation
         self.shift = 0  # how much further right the line goes than the author's, counted from the indentation
 
     def run(self, is_first: bool, is_last: bool) -> list[Edit]:
-        text, tokens = self.text, self.tokens
+        text, roles = self.text, self.roles
         start = len(BYTE_ORDER_MARK) if is_first and text.startswith(BYTE_ORDER_MARK) else 0
-        if not tokens:
+        if not roles:
             if is_first:
                 self._put(start, len(text), b"")
             return self.edits
         self.widths = widths = self._widths()
-        self.line_start = tokens[0].start
+        self.line_start = self.starts[0]
         self._put(start, self.line_start, b"")
-        units, columns, before = self.units, self.columns, tokens[0]
-        for i, token in enumerate(tokens):
-            kind = token.kind
-            if i:
-                width = widths[i]
-                if (
-                    width < 0
-                    or _FIXED.get((before.kind, before.parent, kind, token.parent)) != width
-                    or (kind == "}" and self.open[-1].breaks)
-                    or (len(self.open) == 1 and token.start in units)
-                ):
-                    self._between(i)
-            if token.start in units or token.start in columns or kind in _BRACKETS or self.open[-1].is_empty:
+        marks = {*self.units, *self.columns}
+        self._enter(0)
+        pairs = zip(range(1, len(roles)), roles, roles[1:], self.starts[1:], widths[1:])
+        matter = [
+            (i, role, before.fixed.get(role) != width)
+            for i, before, role, start, width in pairs
+            if before.fixed.get(role) != width or role.is_bracket or start in marks
+        ]
+        for i, role, is_wrong in matter:
+            if is_wrong or ((role.closes or len(self.open) == 1) and self._must_break(i)):
+                self._between(i)
+            if role.is_bracket or self.starts[i] in marks:
                 self._enter(i)
-            before = token
         self._tail(is_last)
         return self.edits
 
     def _widths(self) -> list[int]:
         """The width of the gap before each token, and one more: -1 and less for a line break and more of them;
         a tab counts as two."""
-        text, widths, end = self.text, [0], self.tokens[0].end
-        for token in self.tokens[1:]:
-            width = token.start - end
-            if width > 1 or (width and text[end] != 0x20):
-                breaks = len(LINE_END.findall(text, end, token.start))
-                width = -breaks if breaks else max(width, 2)
-            widths.append(width)
-            end = token.end
-        widths.append(1)
-        return widths
+        text = self.text
+        gaps = zip(self.ends, self.starts[1:])
+        widths = [
+            start - end if start == end or (start == end + 1 and text[end] == 0x20) else self._width(end, start)
+            for end, start in gaps
+        ]
+        return [0, *widths, 1]
+
+    def _width(self, start: int, end: int) -> int:
+        breaks = len(LINE_END.findall(self.text, start, end))
+        return -breaks if breaks else max(end - start, 2)
 
     # --- gaps
 
@@ -131,63 +127,57 @@ class _Layout:
             self.edits.append(Edit(start, end, data))
 
     def _tail(self, is_last: bool) -> None:
-        end = self.tokens[-1].end
+        end = self.ends[-1]
+        if self.text[end:] == self.line_end:
+            return
         breaks = len(LINE_END.findall(self.text[end:]))
         self._put(end, len(self.text), self.line_end * (1 if is_last else min(breaks, 2)))
 
     def _between(self, i: int) -> None:
         """Lay out the gap before the token at ``i``."""
-        before, token, width, bracket = self.tokens[i - 1], self.tokens[i], self.widths[i], self.open[-1]
-        if width < 0 or self._must_break(before, token, bracket):
-            may_be_blank = width < -1 and before.kind not in ("{", "[", "(") and not _closes(token)
+        before, role, width, bracket = self.roles[i - 1], self.roles[i], self.widths[i], self.open[-1]
+        end, start = self.ends[i - 1], self.starts[i]
+        if width < 0 or self._must_break(i):
+            may_be_blank = width < -1 and before.kind not in ("{", "[", "(") and not role.closes
             self.indent = self._indentation(i)
-            self.line_start, self.shift = token.start, 0
-            self._put(
-                before.end, token.start, self.line_end * (2 if may_be_blank else 1) + b" " * self.indent
-            )
+            self.line_start, self.shift = start, 0
+            self._put(end, start, self.line_end * (2 if may_be_blank else 1) + b" " * self.indent)
             return
-        key = (before.kind, before.parent, token.kind, token.parent)
-        comment_follows = i + 1 < len(self.tokens) and self.tokens[i + 1].is_comment
-        gap = Gap(
-            before,
-            token,
-            width,
-            abs(self.widths[i - 1]),
-            abs(self.widths[i + 1]),
-            bracket.width_after,
-            comment_follows,
-        )
-        count, may_align = spaces(gap)
-        if key not in _FIXED and is_fixed(before, token):
-            _FIXED[key] = count
-        if may_align and width > 1 and b"\t" not in self.text[before.end : token.start]:
+        comment_follows = i + 1 < len(self.roles) and self.roles[i + 1].is_comment
+        around = abs(self.widths[i - 1]), abs(self.widths[i + 1])
+        count, may_align = spaces(Gap(before, role, width, *around, bracket.width_after, comment_follows))
+        if role not in before.fixed and is_fixed(before, role):
+            before.fixed[role] = count
+        if may_align and width > 1 and b"\t" not in self.text[end:start]:
             count = max(count, width - self.shift)
-        self.shift += count - (token.start - before.end)
-        self._put(before.end, token.start, b" " * count)
+        self.shift += count - (start - end)
+        self._put(end, start, b" " * count)
 
-    def _must_break(self, before: Token, token: Token, bracket: _Bracket) -> bool:
-        if token.kind == "}":
-            return bracket.breaks
-        return len(self.open) == 1 and token.start in self.units and not before.is_comment
+    def _must_break(self, i: int) -> bool:
+        if self.roles[i].kind == "}":
+            return self.open[-1].breaks
+        return len(self.open) == 1 and self.starts[i] in self.units and not self.roles[i - 1].is_comment
 
     # --- structure
 
     def _enter(self, i: int) -> None:
         """Take note of what the token at ``i``, whose place is now known, means for those after it."""
-        token, bracket = self.tokens[i], self.open[-1]
-        if bracket.is_empty and not token.is_comment:
-            bracket.is_empty = False
-            bracket.breaks = self.widths[i] < 0
-        if token.start in self.units:
-            bracket.unit = self.indent
-        if token.start in self.columns:
-            self.columns[token.start] = self._column(token.start)
-        if _closes(token):
+        role, start = self.roles[i], self.starts[i]
+        if start in self.units:
+            self.open[-1].unit = self.indent
+        if start in self.columns:
+            self.columns[start] = self._column(start)
+        if role.closes:
             self.open.pop()
-        elif (
-            token.kind in _BRACKETS and (token.kind != "<" or token.parent == "vector") and token.kind != ">"
-        ):
-            self.open.append(_Bracket(self.indent, self.indent + INDENT, abs(self.widths[i + 1])))
+        elif role.opens:
+            self.open.append(_Bracket(self.indent, self.indent + INDENT, abs(self.widths[i + 1]), None, self._breaks(i)))
+
+    def _breaks(self, i: int) -> bool:
+        """Whether a line breaks between the opener at ``i`` and the first token after it that is no comment."""
+        i += 1
+        while i < len(self.roles) and self.roles[i].is_comment:
+            i += 1
+        return self.widths[i] < 0
 
     def _column(self, start: int) -> int:
         """The column at which what the author has at ``start`` is laid out."""
@@ -198,27 +188,18 @@ class _Layout:
 
     def _indentation(self, i: int) -> int:
         """The indentation of the token at ``i`` where it begins a line."""
-        token, bracket = self.tokens[i], self.open[-1]
-        if token.is_comment:
-            while token.is_comment:
-                i += 1
-                if i == len(self.tokens) or _closes(self.tokens[i]):
-                    return bracket.body
-                token = self.tokens[i]
-        if _closes(token):
+        role, start, bracket = self.roles[i], self.starts[i], self.open[-1]
+        while role.is_comment:  # it stands as what follows it
+            i += 1
+            if i == len(self.roles) or self.roles[i].closes:
+                return bracket.body
+            role, start = self.roles[i], self.starts[i]
+        if role.closes:
             return bracket.line_indent
-        if token.start in self.anchors:
-            return max(0, self.columns[self.anchors[token.start]] - 2)
-        if token.start in self.units:
-            return bracket.body + self.units[token.start]
+        if start in self.anchors:
+            return max(0, self.columns[self.anchors[start]] - 2)
+        if start in self.units:
+            return bracket.body + self.units[start]
         if bracket.unit is None:
             return bracket.body
-        return bracket.unit + (0 if token.kind == "{" else INDENT)
-
-
-def _closes(token: Token) -> bool:
-    return token.kind in ("}", "]", ")") or (token.kind == ">" and token.parent == "vector")
-
-
-# Spaces between two kinds of tokens wherever they meet, as found out so far; at most all pairs of kinds there are.
-_FIXED: dict[tuple[str, str, str, str], int] = {}
+        return bracket.unit + (0 if role.kind == "{" else INDENT)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .tokens import Token
+from .tokens import Role
 
 _BRACKETS = {
     "call": "()",
@@ -33,8 +33,8 @@ class Gap(NamedTuple):
     """The place between two tokens of one line, with the spaces that the author has there (``width``), before
     ``before``, after ``after`` and behind the bracket that ``after`` closes; a line break counts as one."""
 
-    before: Token
-    after: Token
+    before: Role
+    after: Role
     width: int
     width_before: int
     width_after: int
@@ -72,7 +72,7 @@ def spaces(gap: Gap) -> Spaces:
     return Spaces(1, before.kind not in _NO_ALIGNMENT_AFTER and kind not in _NO_ALIGNMENT_BEFORE)
 
 
-def is_fixed(before: Token, after: Token) -> bool:
+def is_fixed(before: Role, after: Role) -> bool:
     """Whether the spaces between the two depend on their kinds only (apart from those that align)."""
     loose = before.is_comment or after.is_comment or before.is_operator or after.is_operator
     return not loose and before.kind != "(" and after.kind != ")"

@@ -7,8 +7,10 @@ line breaks before it.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cache, cached_property
+from typing import TYPE_CHECKING
+
+from ..reading.grammar import language
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -22,76 +24,112 @@ CONTAINERS = frozenset(("source_file", "block_body", "map_entry", "selection_bod
 _PIECES = frozenset(("guard", "rule", "entry"))
 
 
-class Token(NamedTuple):
-    """``kind`` and ``parent`` are types of nodes (a comment up to the line's end is a ``line_comment``; the opener of
-    a vector such as ``< 1, 2>``, aligned with ``<-1, 2>``, is ``< ``); bytes ``start`` to ``end`` hold no white space at the
-    end."""
+class Role:
+    """What a token is: its ``kind`` and that of its ``parent``, which are types of nodes (a comment up to the line's end is
+    a ``line_comment``; the opener of a vector such as ``< 1, 2>``, aligned with ``<-1, 2>``, is ``< ``).
 
-    kind: str
-    parent: str
-    start: int
-    end: int
+    There is one for each pair, so that what follows from the pair is found out once: ``fixed`` has the spaces before the
+    tokens that may follow, where nothing else decides how many, as far as found out."""
 
-    @property
-    def is_comment(self) -> bool:
-        return self.kind in ("comment", "line_comment")
+    def __init__(self, kind: str, parent: str, is_leaf: bool = True) -> None:
+        self.kind, self.parent, self.is_leaf = kind, parent, is_leaf
+        self.is_comment = kind in ("comment", "line_comment")
+        # The sign of a ``binary`` or ``unary`` node.
+        self.is_operator = parent in ("binary", "unary") and not kind.isalpha() and not self.is_comment
+        in_vector = parent == "vector"
+        self.opens = kind in ("{", "[", "(", "< ") or (kind == "<" and in_vector)
+        self.closes = kind in ("}", "]", ")") or (kind == ">" and in_vector)
+        self.is_bracket = self.opens or self.closes
+        self.is_special = kind in ("-", "+", "comment") or (kind == "<" and in_vector)  # see _special
+        self.is_container, self.aligns = kind in CONTAINERS, kind in ("union", "rule")
+        self.fixed: dict[Role, int] = {}
 
-    @property
-    def is_operator(self) -> bool:
-        """Whether this is the sign of a ``binary`` or ``unary`` node."""
-        return self.parent in ("binary", "unary") and not self.kind.isalpha() and not self.is_comment
+    @cached_property
+    def children(self) -> _Children:
+        """The roles of the children of such a node."""
+        return _Children(self.kind)
 
 
-@dataclass
+class _Children(dict):
+    """The roles of a node's children, by the numbers of their types: reading a type as text takes longer."""
+
+    def __init__(self, parent: str) -> None:
+        self.parent = parent
+
+    def __missing__(self, kind_id: int) -> Role:
+        kind = language().node_kind_for_id(kind_id) or "ERROR"
+        found = self[kind_id] = _role(kind, self.parent, not language().node_kind_is_named(kind_id))
+        return found
+
+
+@cache
+def _role(kind: str, parent: str, is_leaf: bool = True) -> Role:
+    return Role(kind, parent, is_leaf)
+
+
 class Tokens:
-    """``units`` has the start of each unit and how many columns deeper than its container it stands; ``anchors`` the
-    start of each `+` and `|` and that of the operand that it aligns with."""
+    """The tokens as (role, start, end), without white space at the end. ``units`` has the start of each unit and how many
+    columns deeper than its container it stands; ``anchors`` the start of each `+` and `|` and that of the operand that it
+    aligns with."""
 
-    items: list[Token] = field(default_factory=list)
-    units: dict[int, int] = field(default_factory=dict)
-    anchors: dict[int, int] = field(default_factory=dict)
+    __slots__ = "items", "units", "anchors"
+
+    def __init__(self) -> None:
+        self.items: list[tuple[Role, int, int]] = []
+        self.units: dict[int, int] = {}
+        self.anchors: dict[int, int] = {}
 
 
 def tokens_of(root: Node, text: bytes) -> Tokens:
     found = Tokens()
-    _walk(root, root.type, text, found)
+    _walk(root, _role(root.type, "", False), text, found)
     return found
 
 
-def _walk(node: Node, kind: str, text: bytes, found: Tokens) -> None:
-    children = node.children
-    if kind in CONTAINERS:
+def _walk(node: Node, own: Role, text: bytes, found: Tokens) -> None:
+    children, roles = node.children, own.children
+    if own.is_container:
         for child in children:
-            if child.is_named and child.type != "comment":
+            role = roles[child.kind_id]
+            if not role.is_leaf and not role.is_comment:
                 found.units[child.start_byte] = 0
-        if kind == "selection_body":
+        if own.kind == "selection_body":
             _Guards([child for child in children if child.type in _PIECES], text, found.units).read()
-    elif kind in ("union", "rule"):
-        anchor = next((child.start_byte for child in children if child.type in ("term", "alternative")), None)
-        for child in children:
-            if child.type in ("+", "|"):
-                found.anchors[child.start_byte] = anchor
+    elif own.aligns:
+        _align(children, found)
+    items = found.items
     for child in children:
-        name = child.type
-        if child.child_count:
-            _walk(child, name, text, found)
-        else:
-            start, end = child.start_byte, child.end_byte
-            # The grammar's binary minus between operands that stand side by side has its space with it, and so does a
-            # line comment that ends with spaces.
-            if name in ("-", "+") or name == "comment":
-                end = start + len(text[start:end].rstrip())
-            if name == "comment" and text[start + 1] == 0x2F:
-                name = "line_comment"
-            elif (
-                name == "<"
-                and kind == "vector"
-                and text[end : end + 1] == b" "
-                and text[node.end_byte - 2] != 0x20
-            ):
-                name = "< "
-            if end > start:
-                found.items.append(Token(name, kind, start, end))
+        role = roles[child.kind_id]
+        if not role.is_leaf and child.child_count:
+            _walk(child, role, text, found)
+            continue
+        start, end = child.start_byte, child.end_byte
+        if role.is_special:
+            role, end = _special(role, start, end, node, text)
+        if end > start:
+            items.append((role, start, end))
+
+
+def _align(children: list[Node], found: Tokens) -> None:
+    signs = [child for child in children if child.type in ("+", "|")]
+    if signs:
+        anchor = next((child.start_byte for child in children if child.type in ("term", "alternative")), None)
+        found.anchors.update((sign.start_byte, anchor) for sign in signs)
+
+
+def _special(role: Role, start: int, end: int, parent: Node, text: bytes) -> tuple[Role, int]:
+    """Role and end of a token that holds more than its node's type says."""
+    kind = role.kind
+    if kind == "<":
+        if text[end : end + 1] == b" " and text[parent.end_byte - 2] != 0x20:
+            return _role("< ", role.parent), end
+        return role, end
+    # The grammar's binary minus between operands that stand side by side has its space with it, and so does a line
+    # comment that ends with spaces.
+    end = start + len(text[start:end].rstrip())
+    if kind == "comment" and text[start + 1] == 0x2F:
+        return _role("line_comment", role.parent), end
+    return role, end
 
 
 class _Guards:
