@@ -14,10 +14,10 @@ Example::
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Callable, Iterable, Iterator
 
+from .deadline import Deadline
 from .document import Document, Message
 from .scene import Scene
 from .text import Change
@@ -166,7 +166,7 @@ class Project:
     def work(self, seconds: float | None = None) -> bool:
         """Resolve what edits have touched, for at most about ``seconds`` of processor time, so that how far it comes is
         the same on a busy machine; True when all is done."""
-        deadline = None if seconds is None else time.thread_time() + seconds
+        deadline = None if seconds is None else Deadline(seconds)
         return all([scene.work(deadline) for scene in self.scenes.values()])
 
     def messages(self, document: Document) -> list[Message]:

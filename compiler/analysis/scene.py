@@ -15,7 +15,6 @@ Example::
 
 from __future__ import annotations
 
-import time
 from itertools import count
 from pathlib import Path
 from typing import Callable, Iterator
@@ -26,6 +25,7 @@ from ..reading.ignore import WORD as IGNORE_WORD
 from ..reading.ignore import Ignore, ignores, is_ignored
 from ..reading.resolve_names import ARTICLES, Names, _identity
 from ..reading.source import Source, Span
+from .deadline import Deadline
 from .document import Document, Meaning, Message, Place
 from .facts import Definition, drop_facts, facts_of, keep_lost
 from .namespace import Namespace
@@ -80,8 +80,8 @@ class Scene:
         self._pending.add(change)
         self.is_opening |= len(change.added) >= MANY_BLOCKS
 
-    def work(self, deadline: float | None = None) -> bool:
-        """Read and resolve what changes have touched, up to ``deadline`` (of time.thread_time, in seconds), or up to where
+    def work(self, deadline: Deadline | None = None) -> bool:
+        """Read and resolve what changes have touched, up to ``deadline``, or up to where
         only the rest of a file that was opened is left. True when nothing is left to do."""
         had_edits = bool(self._pending or self._edited or self._dirty)
         if not self.read(deadline):
@@ -98,16 +98,16 @@ class Scene:
             self._dirty.pop(block, None)
             self._opened.pop(block, None)
             self._resolve(block)
-            if deadline is not None and time.thread_time() > deadline:
+            if deadline is not None and deadline.has_passed():
                 return self.is_current
         return True
 
-    def read(self, deadline: float | None = None) -> bool:
+    def read(self, deadline: Deadline | None = None) -> bool:
         """The first half of ``work``: after it all names are known, but what is wrong with them isn't."""
         while self._reading is not None or self._pending or not self._names.is_fresh:
             self._reading = self._reading or self._steps()
             for _ in self._reading:
-                if deadline is not None and time.thread_time() > deadline:
+                if deadline is not None and deadline.has_passed():
                     return False
             self._reading = None
         self.is_opening = False

@@ -102,7 +102,7 @@ HABITS: tuple[Habit, ...] = (
     _row(_RULES, rf"(?P<at>\b(\w+)\s*[\[<]\s*({_VALUE}(?:\s*,\s*{_VALUE})+|{_NUMBER})\s*[\]>])", "arguments stand in round brackets", mend=r"\2(\3)"),
     _row(_RULES, r"(?P<at>(?!if\b)\b(\w+)\s+\(([^();]*[\d,*/%-][^();]*)\))", "a space stands between a symbol and its arguments", mend=r"\2(\3)"),
     _row(_RULES, rf"{_ARROW}\s*(?P<at>\+)", "nothing stands before this '+'", "remove it: '+' joins two operands", ""),
-    _row(_RULES, rf"{_ARROW}(?:\s*\w+)*?\s*(?P<at>(\d[\w.]*)\s*\*)\s*\w", "a number doesn't multiply an operand",
+    _row(_RULES, rf"{_ARROW}(?:\s*\b\w+)*?\s*(?P<at>(\d[\w.]*)\s*\*)\s*\w", "a number doesn't multiply an operand",
          r"write [ scale \2 ] for another size; a Selection repeats: Row -> box + [ --n; trans 1 0 0 ] Row"),
     _row(_RULES, rf"(?!{_PRIMITIVE})\b[A-Za-z_]\w*\s*(?P<at>\*)\s*[\w(\[]", "an operator stands before its operand without a sign", mend=""),
     _row(_RULES, r"[\w\])](?P<at>\s*,)\s*(?!else\b)[\w(\[]", "',' doesn't join what a rule produces", mend=" +"),

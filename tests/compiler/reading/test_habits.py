@@ -183,5 +183,6 @@ def test_a_habit_in_a_comment_or_a_text_is_none():
 
 def test_long_broken_lines_are_read_in_time():
     """Every pattern stays linear in what it looks at, and looks at a part of the line only."""
-    for piece in ("A -> F[+F] ", "if (n => 0) ", "<0 1 2> ", "a ** ", "((((", "n = m = ", "'"):
+    for piece in ("A -> F[+F] ", "if (n => 0) ", "<0 1 2> ", "a ** ", "((((", "n = m = ", "'",
+                  "A -> theScaledCylinderOfTheTrunk cylinder ] "):  # fmt: skip
         assert parse(Source.from_text("Selection A { " + piece * 1000 + "}"))[1].items
