@@ -202,7 +202,9 @@ class Text:
             high += taken
         change, head = self._exchange(low, high, [(new[piece.start : piece.end], piece.shape) for piece in joined])
         if len(change.removed) == len(change.added) == 1:
-            base = self._starts[low + head]
+            # What was taken in behind the edit may lie where starts aren't summed up.
+            starts = self._starts if low + head < len(self._starts) else self.starts
+            base = starts[low + head]
             _link(change, start - base, end - base, len(data))
         return change
 

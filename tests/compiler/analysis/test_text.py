@@ -30,6 +30,10 @@ def characters(data: bytes) -> list[int]:
 @settings(max_examples=300, deadline=None)
 @given(texts, edits)
 @example("\nSelection A\n{ A -> box; }\n#declare A = ", [(0.0, 0.0, "\nCalculation C {}/*"), (0.0, 0.0, "/*"), (1.0, 0.0, "*/")])
+@example(
+    "\nSelection A\n{ A -> box; }\n*/",
+    [(0.0, 0.0, "\nSelection A\n{ A -> box; }\n"), (0.0, 0.0, 2 * "\nSelection A\n{ A -> box; }\n" + "/*")],
+)
 def test_edits_and_lines_as_of_a_string(start, changes):
     data = start.encode()
     text = Text("x", None, data)
