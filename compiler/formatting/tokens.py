@@ -146,22 +146,32 @@ class _Guards:
 
     def _production(self, i: int, depth: int) -> int:
         """Indent the production at ``pieces[i]``; where the next one is."""
-        node = self.pieces[i]
-        self.units[node.start_byte] = depth
-        if node.type != "guard" or node.children[0].type == "else":
-            return i + 1
-        i = self._guarded(i, depth)
-        if i < len(self.pieces) and self._is_else(i):
+        while True:
             self.units[self.pieces[i].start_byte] = depth
+            if self._word(i) != "if":
+                return i + 1
             i = self._guarded(i, depth)
-        return i
+            if self._word(i) != "else":
+                return i
+            self.units[self.pieces[i].start_byte] = depth
+            if self._word(i + 1) != "if":
+                return self._guarded(i, depth)
+            depth = self._depth_after(i, depth)  # an `else if` is no nesting: there may be very many
+            i += 1
 
     def _guarded(self, i: int, depth: int) -> int:
         """Indent what the guard at ``pieces[i]`` is for."""
-        if i + 1 == len(self.pieces) or self._is_else(i + 1):
+        if self._word(i + 1) in ("", "else"):
             return i + 1
-        between = self.text[self.pieces[i].end_byte : self.pieces[i + 1].start_byte]
-        return self._production(i + 1, depth + INDENT if LINE_END.search(between) else depth)
+        return self._production(i + 1, self._depth_after(i, depth))
 
-    def _is_else(self, i: int) -> bool:
-        return self.pieces[i].type == "guard" and self.pieces[i].children[0].type == "else"
+    def _depth_after(self, i: int, depth: int) -> int:
+        between = self.text[self.pieces[i].end_byte : self.pieces[i + 1].start_byte]
+        return depth + INDENT if LINE_END.search(between) else depth
+
+    def _word(self, i: int) -> str:
+        """How the piece at ``i`` begins if it is a guard: `if` or `else`; `rule` for others, nothing behind the last."""
+        if i >= len(self.pieces):
+            return ""
+        piece = self.pieces[i]
+        return "rule" if piece.type != "guard" else "else" if piece.children[0].type == "else" else "if"

@@ -121,14 +121,23 @@ class _Body(RightSides):
                 piece.span, "this 'else' belongs to no 'if'", "an else follows the rule of an if"
             )
             return None, i + 1
-        then, i = self.guarded(pieces, i + 1, piece, depth)
+        links = []  # of `if … else if … else if …`, which is no nesting: as long as one likes
         otherwise = None
-        if i < len(pieces) and pieces[i].kind == "else":
-            otherwise, i = self.guarded(pieces, i + 1, pieces[i], depth)
-        if then is None:
-            return otherwise, i
-        span = piece.span.to((otherwise or then).span)
-        return syntax.If(span, piece.value, then, otherwise), i
+        while True:
+            then, i = self.guarded(pieces, i + 1, piece, depth)
+            links.append((piece, then))
+            if i == len(pieces) or pieces[i].kind != "else":
+                break
+            if i + 1 == len(pieces) or pieces[i + 1].kind != "if":
+                otherwise, i = self.guarded(pieces, i + 1, pieces[i], depth)
+                break
+            i += 1
+            piece = pieces[i]
+        for piece, then in reversed(links):
+            if then is not None:
+                span = piece.span.to((otherwise or then).span)
+                otherwise = syntax.If(span, piece.value, then, otherwise)
+        return otherwise, i
 
     def guarded(
         self, pieces: list[_Piece], i: int, guard: _Piece, depth: int

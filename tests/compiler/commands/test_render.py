@@ -41,6 +41,28 @@ def test_render_json(tmp_path, capsys):
     assert told["image"] == str(tmp_path / "t.png")
 
 
+def test_a_thousand_else_ifs(tmp_path, capsys):
+    """They are no nesting: such a scene checks and compiles, and the picture shows what the one that holds places."""
+    rules = "".join(f"if (n == {i}) A -> box; else\n    " for i in range(999))
+    text = """camera {{ location <0, 0, -5> look_at 0 }} object {{ A texture {{ pigment {{ color rgb 1 }} finish {{ ambient 1 }} }} }}
+Calculation C {{ n = {n}; }}
+Selection A
+{{
+    C A;
+    {rules}if (n == 999) A -> sphere + [ trans 1 0 0 ] sphere;
+}}
+"""
+    for n, count in ((998, 1), (999, 2), (1000, 0)):
+        scene = tmp_path / "chain.plsys"
+        scene.write_text(text.format(n=n, rules=rules))
+        assert main(["check", str(scene)]) == 0
+        assert main(["format", "--check", str(scene)]) in (0, 1)
+        capsys.readouterr()
+        told = facts(capsys, "render", str(scene), "-o", str(tmp_path / "c.png"), *SMALL)
+        assert told["primitives"] == count
+        assert bool(pixels(tmp_path / "c.png").any()) is (count > 0)
+
+
 def test_statistics_add_up(tmp_path, capsys):
     told = facts(capsys, "render", TREE, "-o", str(tmp_path / "t.png"), "--threads", "1", *SMALL)
     rays, tests, each = sum(told["rays"].values()), told["tests"], told["tests_per_ray"]

@@ -258,7 +258,6 @@ DEEP = 10_000
         "#declare X = " + "(" * DEEP + "1" + ")" * DEEP,
         "Selection A { A -> " + "(" * DEEP + "A" + ")" * DEEP + "; }",
         "Selection A { " + "if (1) " * DEEP + "A -> x; }",
-        "Selection A { " + "if (1) A -> x; else " * DEEP + "A -> x; }",
         "Selection A { " + "{" * DEEP + "A -> x;" + "}" * DEEP + "}",
         "Calculation C { a = " + "1+" * DEEP + "1; }",
         "Calculation C { a = " + "- " * DEEP + "1; }",
@@ -273,6 +272,15 @@ def test_deep_nesting_is_a_message(text: str) -> None:
     assert [(item.message, item.hint) for item in diagnostics.items] == [
         ("this is nested too deeply", f"the limit is {MAX_DEPTH} levels")
     ]
+
+
+def test_else_if_is_no_nesting() -> None:
+    file, diagnostics = parse(Source.from_text("Selection A { " + "if (1) A -> x; else " * DEEP + "A -> x; }"))
+    assert not diagnostics.items
+    (rule,), count = file.definitions[0].productions, 0
+    while isinstance(rule, syntax.If):
+        rule, count = rule.otherwise, count + 1
+    assert count == DEEP and isinstance(rule, syntax.Rule)
 
 
 @pytest.mark.parametrize("opener", list("([{<") + ["f(", "union {", "A -> (", '"', "/*", ")", "}"])
