@@ -15,13 +15,24 @@ FORMS = {"rgb": (0, 1, 2), "rgbf": (0, 1, 2, 3), "rgbt": (0, 1, 2, 4), "rgbft": 
 _WORDS = (b"rgb", b"color", b"colour", b"pigment", b"finish", b"background", b"light_source", b"declare", b"ambient")
 
 
-def colours_of(scene: Scene, block: Block) -> Iterator[tuple[int, int, list[float]]]:
-    """Constant colours of a block: where, and the five components."""
-    if not any(word in block.data for word in _WORDS):
-        return
-    for definition in facts_of(block).file.definitions:
-        for items in item_lists(definition):
-            yield from colours_in(scene, items)
+Colour = tuple[int, int, list[float]]
+
+
+def colours_of(scene: Scene, block: Block) -> list[Colour]:
+    """Constant colours of a block: where, and the five components. They are kept with the block if no name that they are made
+    of can come to mean something else."""
+    kept = block.__dict__.get("colours")
+    if kept is not None:
+        return kept
+    found = []
+    if any(word in block.data for word in _WORDS):
+        for definition in facts_of(block).file.definitions:
+            for items in item_lists(definition):
+                found += colours_in(scene, items)
+    colours = [(start, end, parts) for start, end, parts, _ in found if parts is not None]
+    if all(is_literal for *_, is_literal in found):
+        block.__dict__["colours"] = colours
+    return colours
 
 
 def item_lists(node: Any) -> Iterator[tuple]:
@@ -34,23 +45,27 @@ def item_lists(node: Any) -> Iterator[tuple]:
             yield from item_lists(item)
 
 
-def colours_in(scene: Scene, items: tuple) -> Iterator[tuple[int, int, list[float]]]:
+def colours_in(scene: Scene, items: tuple) -> Iterator[tuple[int, int, list[float] | None, bool]]:
+    """Colours among ``items``: where, the components (None for what isn't constant), and whether they are written as numbers
+    or by a name of the vocabulary."""
     following = (*items[1:], None)
     for item, after in zip(items, following):
         if not isinstance(item, syntax.Name):
             continue
         if item.name in vocabulary.COLOURS:
-            yield item.span.start, item.span.end, five(vocabulary.COLOURS[item.name])
+            yield item.span.start, item.span.end, five(vocabulary.COLOURS[item.name]), True
         elif item.name in FORMS and isinstance(after, syntax.Vector | syntax.Number):
             components = after.components if isinstance(after, syntax.Vector) else (after,)
             numbers = [constant_of(scene, each) for each in components]
             if len(numbers) == 1:
                 numbers *= len(FORMS[item.name])
+            parts = None
             if None not in numbers and len(numbers) == len(FORMS[item.name]):
                 parts = [0.0] * 5
                 for place, value in zip(FORMS[item.name], numbers):
                     parts[place] = value
-                yield item.span.start, after.span.end, parts
+            is_literal = all(isinstance(each, syntax.Number) for each in components)
+            yield item.span.start, after.span.end, parts, is_literal
 
 
 def five(parts: list[float]) -> list[float]:

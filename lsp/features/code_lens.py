@@ -8,14 +8,22 @@ Example: over ``Selection Tree`` stands ``5 references``, and over the first ``c
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
-from plsys.compiler.analysis import facts_of
+from plsys.compiler.analysis import Block, facts_of
 from plsys.lsp.request import Feature, Request
 
 PREVIEWED = ("camera", "object")
 # In files with more definitions than this, only Selections have lenses: editors ask for all of them after each edit.
 MANY = 1000
+
+
+class _Names(NamedTuple):
+    """What of a block can have lenses: names that it defines, with their kinds, and the first of each of its scene blocks
+    that can be previewed. Bytes count from its start."""
+
+    definitions: list[tuple[str, str, int, int]]
+    previewed: dict[str, tuple[int, int]]
 
 
 def code_lenses(request: Request) -> list[dict[str, Any]]:
@@ -25,12 +33,28 @@ def code_lenses(request: Request) -> list[dict[str, Any]]:
     if first is not None:
         command = {"title": "▶ Preview", "command": "plsys.preview", "arguments": [uri]}
         lenses.append({"range": request.range(*first), "command": command})
-    named = [each for each in request.document.outline() if each.name and each.kind != "block"]
-    for each in named:
-        if len(named) <= MANY or each.kind == "selection":
-            data = {"uri": uri, "name": each.name}
-            lenses.append({"range": request.range(each.name_start, each.name_end), "data": data})
+    text = request.document.text
+    found = [(_names_of(block).definitions, base) for block, base in zip(text.blocks, text.starts)]
+    are_many = sum(len(definitions) for definitions, _ in found) > MANY
+    for definitions, base in found:
+        for name, kind, start, end in definitions:
+            if not are_many or kind == "selection":
+                data = {"uri": uri, "name": name}
+                lenses.append({"range": request.range(base + start, base + end), "data": data})
     return lenses
+
+
+def _names_of(block: Block) -> _Names:
+    """Kept with the block."""
+    kept = block.__dict__.get("lenses")
+    if kept is None:
+        facts, previewed = facts_of(block), {}
+        for node in facts.blocks:
+            if node.name.name in PREVIEWED:
+                previewed.setdefault(node.name.name, (node.name.span.start, node.name.span.end))
+        definitions = [(each.name, each.kind, each.name_span.start, each.name_span.end) for each in facts.definitions]
+        kept = block.__dict__["lenses"] = _Names(definitions, previewed)
+    return kept
 
 
 def preview_place(request: Request) -> tuple[int, int] | None:
@@ -38,9 +62,8 @@ def preview_place(request: Request) -> tuple[int, int] | None:
     found: dict[str, tuple[int, int]] = {}
     text = request.document.text
     for block, base in zip(text.blocks, text.starts):
-        for node in facts_of(block).blocks:
-            span = node.name.span
-            found.setdefault(node.name.name, (base + span.start, base + span.end))
+        for name, (start, end) in _names_of(block).previewed.items():
+            found.setdefault(name, (base + start, base + end))
     return next((found[name] for name in PREVIEWED if name in found), None)
 
 

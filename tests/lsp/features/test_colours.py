@@ -50,3 +50,12 @@ def test_presentations():
     assert labels(red=1, green=1, blue=1) == ["rgb <1, 1, 1>", "White"]
     assert labels(red=0.5, green=0, blue=0) == ["rgb <0.214, 0, 0>"]
     assert labels(red=0, green=0, blue=0, alpha=0.25) == ["rgbt <0, 0, 0, 0.75>", "rgbf <0, 0, 0, 0.75>"]
+
+
+def test_a_colour_follows_the_constant_that_it_is_made_of():
+    editor = Editor("#declare r = 1;\ncamera { }\nbackground { color rgb <r, 0, 0> }\nlight_source { 0 color rgb 1 }\n")
+    before = editor.in_file("textDocument/documentColor")
+    editor.change("= 1", "= 0")
+    after = editor.in_file("textDocument/documentColor")
+    assert [round(each["color"]["red"], 6) for each in before] == [1, 1]
+    assert [round(each["color"]["red"], 6) for each in after] == [0, 1]
