@@ -115,6 +115,17 @@ class Dispatcher:
             gc.unfreeze()
             gc.collect()
         gc.freeze()
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Go on with what can be prepared as long as nothing else is to do."""
+        if self.is_busy:
+            delay = PAUSE_S
+        elif self.session.prepare():
+            return
+        else:
+            delay = 0.0
+        self._pause = asyncio.get_running_loop().call_later(delay, self._prepare)
 
     def _handle(self, message: Any) -> None:
         number = message.get("id") if isinstance(message, dict) else None

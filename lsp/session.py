@@ -20,7 +20,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, Callable
 
-from plsys.compiler.analysis import Checker, Document, Folders, Found, Result
+from plsys.compiler.analysis import Checker, Document, Folders, Found, Result, prepare_format
 
 from . import features
 from .progress import Progress
@@ -351,6 +351,10 @@ class Session:
             self._checker.go()
             if self._checker.is_idle:
                 self.progress.end("checks")
+
+    def prepare(self) -> bool:
+        """Do for a moment, in a pause, what a request would have to wait for; whether nothing is left of that."""
+        return self.has_work or all(prepare_format(document, SLICE) for document in list(self.workspace.uris))
 
     def _later(self, take: Callable[[Any], None], what: Any) -> None:
         """Have ``work`` take in what a worker found. In any thread."""

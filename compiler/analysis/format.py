@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..formatting import Edit, apply, format_tree
+from .deadline import Deadline
 from .document import Document
 from .facts import facts_of
 from .text import Block
@@ -55,6 +56,18 @@ def format_document(document: Document, start: int = 0, end: int | None = None) 
             _within(edit, low) for edit in edits if low <= edit.end < high or edit.end == high == len(text)
         ]
     return Formatted(document, edits, skipped)
+
+
+def prepare_format(document: Document, seconds: float) -> bool:
+    """Find out for up to ``seconds`` of processor time what formats the blocks of ``document``, so that formatting it has
+    little left to do; whether all is found out."""
+    deadline, line_end, last = Deadline(seconds), line_end_of(document), len(document.text.blocks) - 1
+    for index, block in enumerate(document.text.blocks):
+        if "formatted" not in block.__dict__ and not facts_of(block).is_broken:
+            _edits_of(block, line_end, index == 0, index == last)
+            if deadline.has_passed():
+                return False
+    return True
 
 
 def line_end_of(document: Document) -> bytes:

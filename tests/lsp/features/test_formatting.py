@@ -72,3 +72,23 @@ def test_a_brace_in_broken_text_goes_below_its_opener():
 
 def test_braces_in_comments_and_strings_do_not_count():
     assert typed('Parameter p = 1 "{"; // {\n<cursor>\n', "\n") == 'Parameter p = 1 "{"; // {\n\n'
+
+
+def test_what_was_prepared_in_a_pause_is_what_formats(monkeypatch):
+    monkeypatch.setattr("plsys.lsp.session.SLICE", 0.0)
+    text = "".join(f"Calculation C{i}{{n=1;}}\n" for i in range(20)) + "Calculation D{ n = ; }\n"
+    prepared, fresh = Editor(text), Editor(text)
+    prepared.published()
+    slices = 1
+    while not prepared.session.prepare():
+        slices += 1
+    assert slices > 1
+    options = {"tabSize": 4, "insertSpaces": True}
+    for old, new in (("n=1", "n=1"), ("C0{n=1;}\n", ""), ("n=1", "n  =  1"), ("n = ;", "n=2;")):
+        for editor in (prepared, fresh):
+            editor.change(old, new)
+        answers = [editor.in_file("textDocument/formatting", options=options) for editor in (prepared, fresh)]
+        assert answers[0] == answers[1] and answers[0]
+        prepared.published()
+        while not prepared.session.prepare():
+            pass
