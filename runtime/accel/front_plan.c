@@ -180,6 +180,9 @@ static bool list_state(pl_state_list *states, uint32_t state)
 /* Given to an instance's state whatever its probability, which may be too small for a number: it has a front. */
 #define LEAST_VISITS 1e-300
 
+/* States opened for an item that stays: a recursion through states of one item each would open without end. */
+enum { OPENED_AN_ITEM = 16 };
+
 /* What stands below a state in a front, once that is reached; gives up above `most` items. visits: where not NULL, those
  * of the instances' states grow by `share` times the probability of entering them. */
 static bool count_below(const pl_front_plan *plan, pl_front_counting *counting, pl_plan_entry from, double threshold,
@@ -213,7 +216,7 @@ static bool count_below(const pl_front_plan *plan, pl_front_counting *counting, 
                 if (visits) visits[item->what] += share * reached + LEAST_VISITS;
             }
         }
-        counts->whole = counts->primitives + counts->instances + top <= most;
+        counts->whole = counts->primitives + counts->instances + top <= most && counts->opened / OPENED_AN_ITEM <= most;
         if (top == 0 || !counts->whole) return true;
         at = counting->stack[--top];
     }

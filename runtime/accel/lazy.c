@@ -14,7 +14,7 @@
  * of which nothing is known. The first is hundreds of times what a ray needs that grazes all trees of a forest; a path has
  * no more symbols than the second. */
 #define MOST_WORK (UINT64_C(1) << 24)
-enum { MOST_UNKNOWN = PL_LIMIT_DEPTH };
+enum { MOST_UNKNOWN = PL_LIMIT_DEPTH + 1024 };
 
 /* Frames from the end that pin their states: a path may be longer than the cache is large. */
 enum { PINNED = 16 };
