@@ -10,7 +10,7 @@ BIN := .venv/bin
 SOURCES := pyproject.toml CMakeLists.txt README.md LICENSE grammar/src/parser.c \
   $(shell find compiler lsp runtime -name '*.py' -o -name '*.c' -o -name '*.h')
 RUNTIME_C := $(wildcard runtime/*.c runtime/shapes/*.c runtime/accel/*.c)
-CFLAGS_DEV := -std=gnu11 -O3 -g -Wall -Wextra -Werror -ffp-contract=off -fno-math-errno -fPIC -fvisibility=hidden -Iruntime -Iruntime/include
+CFLAGS_DEV := -std=gnu11 -O3 -g -Wall -Wextra -Werror -Wno-psabi -ffp-contract=off -fno-math-errno -fPIC -fvisibility=hidden -Iruntime -Iruntime/include
 
 .PHONY: render test stress help dev generate bench bench-lsp check-generated bless wheel clean
 

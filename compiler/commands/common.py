@@ -58,7 +58,6 @@ def size(text: str) -> tuple[int, int]:
 def build_scene(arguments: argparse.Namespace):
     """The compilation of ``arguments.scene``; its warnings are printed. Raises SceneError, PlsysError."""
     from ..pipeline import build
-    from ..reading.source import Source
 
     compilation = build(read_source(arguments.scene), parameters=dict(arguments.parameters), seed=arguments.seed)
     show_diagnostics(d for d in compilation.diagnostics if d.severity == "warning")

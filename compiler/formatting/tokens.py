@@ -7,10 +7,8 @@ line breaks before it.
 from __future__ import annotations
 
 import re
-from functools import cache, cached_property
+from functools import cache
 from typing import TYPE_CHECKING
-
-from ..reading.grammar import language
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -44,21 +42,13 @@ class Role:
         self.is_container, self.aligns = kind in CONTAINERS, kind in ("union", "rule")
         self.fixed: dict[Role, int] = {}
 
-    @cached_property
-    def children(self) -> _Children:
-        """The roles of the children of such a node."""
-        return _Children(self.kind)
+        self.children: dict[int, Role] = {}  # by the number of a child's type: reading it as text takes longer
 
-
-class _Children(dict):
-    """The roles of a node's children, by the numbers of their types: reading a type as text takes longer."""
-
-    def __init__(self, parent: str) -> None:
-        self.parent = parent
-
-    def __missing__(self, kind_id: int) -> Role:
-        kind = language().node_kind_for_id(kind_id) or "ERROR"
-        found = self[kind_id] = _role(kind, self.parent, not language().node_kind_is_named(kind_id))
+    def of_child(self, node: Node) -> Role:
+        """The role of a child of such a node."""
+        found = self.children.get(node.kind_id)
+        if found is None:
+            found = self.children[node.kind_id] = _role(node.type, self.kind, not node.is_named)
         return found
 
 
@@ -87,10 +77,10 @@ def tokens_of(root: Node, text: bytes) -> Tokens:
 
 
 def _walk(node: Node, own: Role, text: bytes, found: Tokens) -> None:
-    children, roles = node.children, own.children
+    children, role_of = node.children, own.of_child
     if own.is_container:
         for child in children:
-            role = roles[child.kind_id]
+            role = role_of(child)
             if not role.is_leaf and not role.is_comment:
                 found.units[child.start_byte] = 0
         if own.kind == "selection_body":
@@ -99,7 +89,7 @@ def _walk(node: Node, own: Role, text: bytes, found: Tokens) -> None:
         _align(children, found)
     items = found.items
     for child in children:
-        role = roles[child.kind_id]
+        role = role_of(child)
         if not role.is_leaf and child.child_count:
             _walk(child, role, text, found)
             continue

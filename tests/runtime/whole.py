@@ -16,7 +16,7 @@ from tempfile import mkdtemp
 
 HERE = Path(__file__).resolve().parent
 RUNTIME = HERE.parents[1] / "runtime"
-FLAGS = ["-std=gnu11", "-g", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-fno-math-errno"]
+FLAGS = ["-std=gnu11", "-g", "-Wall", "-Wextra", "-Werror", "-Wno-psabi", "-ffp-contract=off", "-fno-math-errno"]
 FLAGS += [f"-I{RUNTIME}", f"-I{RUNTIME / 'include'}", f"-I{HERE}"]
 VARIANTS = {
     "plain": ["-O2"],
