@@ -194,7 +194,7 @@ def cursors(bench: Bench, count: int) -> None:
         places = sorted({(p["line"], p["character"]) for p in (bench.place() for _ in range(100))}, reverse=True)
         changes = [{"line": line, "character": character} for line, character in places]
         bench.edit("edit → diagnostics, 100 cursors", [insertion(place, "x") for place in changes])
-        bench.edit("edit → diagnostics, 100 cursors", [deletion(place, 1) for place in reversed(changes)][::-1])
+        bench.edit("edit → diagnostics, 100 cursors", [deletion(place, 1) for place in reversed(changes)])
 
 
 def all_of_cursors(bench: Bench, count: int) -> None:
@@ -203,7 +203,7 @@ def all_of_cursors(bench: Bench, count: int) -> None:
     for _ in range(count // 2):
         places = sorted({(p["line"], p["character"]) for p in (bench.place() for _ in range(100))}, reverse=True)
         changes = [{"line": line, "character": character} for line, character in places]
-        for edits in ([insertion(place, "x") for place in changes], [deletion(place, 1) for place in reversed(changes)][::-1]):
+        for edits in ([insertion(place, "x") for place in changes], [deletion(place, 1) for place in reversed(changes)]):
             bench.version += 1
             started = bench.start()
             bench.client.change(bench.uri, bench.version, *edits)
