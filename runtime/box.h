@@ -16,6 +16,19 @@
 #include <math.h>
 #include <stdbool.h>
 
+/* The nearest single on the one side of a number: a box rounded outward holds the box that it was. */
+static inline float pl_round_down(double x)
+{
+    float f = (float)x;
+    return (double)f > x ? nextafterf(f, -INFINITY) : f;
+}
+
+static inline float pl_round_up(double x)
+{
+    float f = (float)x;
+    return (double)f < x ? nextafterf(f, INFINITY) : f;
+}
+
 typedef struct pl_box {
     double lo[3], hi[3];
 } pl_box;

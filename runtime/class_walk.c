@@ -9,15 +9,11 @@
 #include <string.h>
 
 #include "class.h"
+#include "array.h"
 #include "error.h"
 #include "random.h"
 
 enum { MOST_WORK = 4096, BUCKETS = 512, NONE = UINT32_MAX };
-
-typedef struct growing {
-    void *data;
-    size_t count, capacity, element;
-} growing;
 
 /* A class on this walk. */
 typedef struct cell {
@@ -42,7 +38,7 @@ struct pl_class_walk {
     const pl_program *program;
     pl_mesh_tree *const *meshes;
     pl_class_grid grid;
-    growing levels, scopes, maps, cells, lives;
+    pl_array levels, scopes, maps, cells, lives;
     uint32_t buckets[BUCKETS];
     pl_range *scope, *live; /* at the current node; of the class being looked up */
     pl_range_result result;
@@ -72,7 +68,7 @@ pl_class_walk *pl_class_walk_create(const pl_program *program, pl_mesh_tree *con
 void pl_class_walk_free(pl_class_walk *w)
 {
     if (!w) return;
-    growing *arrays[] = {&w->levels, &w->scopes, &w->maps, &w->cells, &w->lives};
+    pl_array *arrays[] = {&w->levels, &w->scopes, &w->maps, &w->cells, &w->lives};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]->data);
     free(w->scope);
     free(w->live);
@@ -82,20 +78,6 @@ void pl_class_walk_free(pl_class_walk *w)
 uint64_t pl_class_walk_visited(const pl_class_walk *w)
 {
     return w->visited;
-}
-
-static void *extend(growing *a, size_t more)
-{
-    if (a->count + more > a->capacity || !a->data) {
-        size_t capacity = 2 * (a->count + more) + 8;
-        void *data = realloc(a->data, capacity * a->element);
-        if (!data) return NULL;
-        a->data = data;
-        a->capacity = capacity;
-    }
-    void *place = (char *)a->data + a->count * a->element;
-    a->count += more;
-    return place;
 }
 
 static cell *cell_at(const pl_class_walk *w, uint32_t index)
@@ -152,8 +134,8 @@ static uint32_t find_cell(pl_class_walk *w, uint32_t symbol, const pl_range *liv
             (!count || memcmp((pl_range *)w->lives.data + c->live, live, count * sizeof *live) == 0))
             return i;
     }
-    pl_range *kept = extend(&w->lives, count);
-    cell *place = extend(&w->cells, 1);
+    pl_range *kept = pl_array_extend(&w->lives, count);
+    cell *place = pl_array_extend(&w->cells, 1);
     if (!kept || !place) return NONE;
     if (count) memcpy(kept, live, count * sizeof *live);
     *is_new = true;
@@ -165,7 +147,7 @@ static uint32_t find_cell(pl_class_walk *w, uint32_t symbol, const pl_range *liv
 
 static level *push(pl_class_walk *w, uint8_t kind, uint32_t node)
 {
-    level *l = extend(&w->levels, 1);
+    level *l = pl_array_extend(&w->levels, 1);
     if (l)
         *l = (level){.node = node, .kind = kind, .empty = true, .scope = w->scopes.count, .map = w->maps.count,
                      .bounds = pl_bounds_nothing()};
@@ -177,7 +159,7 @@ static level *push_scope(pl_class_walk *w, uint32_t node)
 {
     const uint32_t count = w->program->parameter_count;
     level *l = push(w, w->program->nodes[node].kind, node);
-    pl_range *kept = l ? extend(&w->scopes, count) : NULL;
+    pl_range *kept = l ? pl_array_extend(&w->scopes, count) : NULL;
     if (!kept) return NULL;
     if (count) memcpy(kept, w->scope, count * sizeof *kept);
     return l;
@@ -285,7 +267,7 @@ static step descend(pl_class_walk *w, uint32_t *node, pl_bounds *bounds)
     case PL_NODE_TRANSFORM_CODE:
         if (!run(w, it->as.transform_code.code)) return nothing_known(w);
         if (!push(w, it->kind, *node)) return FAILED;
-        pl_range_map *map = extend(&w->maps, 1);
+        pl_range_map *map = pl_array_extend(&w->maps, 1);
         if (!map) return FAILED;
         *map = w->result.map;
         *node = it->as.transform_code.child;

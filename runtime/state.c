@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "coverage.h"
+#include "array.h"
 #include "error.h"
 #include "random.h"
 
@@ -27,34 +28,13 @@ typedef struct open_state {
     size_t trails, trail_counts; /* where its items' trails and their lengths begin */
 } open_state;
 
-/* A growing array of fixed-size elements. */
-typedef struct array {
-    void *data;
-    size_t count, capacity, element;
-} array;
-
 typedef struct builder {
     pl_states *states;
     pl_walk walk;
     pl_scope scope;
-    array items, chain, path, visits, open, members, scopes, trails, trail_counts, key;
+    pl_array items, chain, path, visits, open, members, scopes, trails, trail_counts, key;
     pl_error *error;
 } builder;
-
-/* Room for `more` elements at the end; NULL: no memory. */
-static void *extend(array *a, size_t more)
-{
-    if (a->count + more > a->capacity || !a->data) {
-        size_t capacity = 2 * (a->count + more) + 8;
-        void *data = realloc(a->data, capacity * a->element);
-        if (!data) return NULL;
-        a->data = data;
-        a->capacity = capacity;
-    }
-    void *place = (char *)a->data + a->count * a->element;
-    a->count += more;
-    return place;
-}
 
 /* --- memory --- */
 
@@ -134,7 +114,7 @@ static bool make_key(builder *b, uint32_t symbol, const pl_scope *scope)
     const pl_node *node = &program->nodes[symbol];
     uint32_t words = node->as.symbol.live_count + 2;
     b->key.count = 0;
-    uint64_t *key = extend(&b->key, words);
+    uint64_t *key = pl_array_extend(&b->key, words);
     if (!key) return pl_fail_memory(b->error, "building the states");
     for (uint32_t i = 0; i < words; i++) key[i] = key_word(program, symbol, scope, i);
     return true;
@@ -229,7 +209,7 @@ static bool remember_transform(builder *b)
         if (!(transform = keep(b, transform, sizeof *transform))) return false;
     }
     b->chain.count = b->walk.at.marks[0]++;
-    const pl_transform **place = extend(&b->chain, 1);
+    const pl_transform **place = pl_array_extend(&b->chain, 1);
     if (!place) return pl_fail_memory(b->error, "building the states");
     *place = transform;
     return true;
@@ -238,7 +218,7 @@ static bool remember_transform(builder *b)
 static bool remember_node(builder *b)
 {
     b->path.count = b->walk.at.marks[1]++;
-    pl_trail_node *place = extend(&b->path, 1);
+    pl_trail_node *place = pl_array_extend(&b->path, 1);
     if (!place) return pl_fail_memory(b->error, "building the states");
     *place = (pl_trail_node){b->walk.node, b->walk.at.marks[0]};
     return true;
@@ -261,16 +241,16 @@ static bool add_item(builder *b, uint8_t kind, uint32_t what)
     item.transforms = keep(b, b->chain.data, item.transform_count * sizeof *item.transforms);
     item.terms = keep(b, walk->path.terms, item.term_count * sizeof *item.terms);
     if (!item.transforms || !item.terms) return false;
-    pl_item *place = extend(&b->items, 1);
-    uint32_t *trail_count = extend(&b->trail_counts, 1);
-    pl_trail_node *trail = extend(&b->trails, walk->at.marks[1]);
+    pl_item *place = pl_array_extend(&b->items, 1);
+    uint32_t *trail_count = pl_array_extend(&b->trail_counts, 1);
+    pl_trail_node *trail = pl_array_extend(&b->trails, walk->at.marks[1]);
     if (!place || !trail_count || !trail) return pl_fail_memory(b->error, "building the states");
     *place = item;
     *trail_count = walk->at.marks[1];
     if (*trail_count) memcpy(trail, b->path.data, *trail_count * sizeof *trail);
     if (kind != PL_NODE_ENTER) return true;
 
-    uint64_t *words = extend(&b->scopes, pl_scope_words(walk->program, &walk->scope));
+    uint64_t *words = pl_array_extend(&b->scopes, pl_scope_words(walk->program, &walk->scope));
     if (!words) return pl_fail_memory(b->error, "building the states");
     pl_scope_pack(walk->program, &walk->scope, words);
     pl_walk_prune(walk);
@@ -323,8 +303,8 @@ static bool begin_visit(builder *b, uint32_t symbol, const uint64_t *key)
     open_state open = {b->states->count, b->trails.count, b->trail_counts.count};
     if (!add_state(b, symbol, key) || !derive_items(b)) return false;
     pl_item *items = keep(b, b->items.data, b->items.count * sizeof *items);
-    visit *place = extend(&b->visits, 1);
-    open_state *open_place = extend(&b->open, 1);
+    visit *place = pl_array_extend(&b->visits, 1);
+    open_state *open_place = pl_array_extend(&b->open, 1);
     if (!items) return false;
     if (!place || !open_place) return pl_fail_memory(b->error, "building the states");
     *place = v;
@@ -409,7 +389,7 @@ static bool finish_component(builder *b, size_t first)
     bool cyclic = states->list[open->state].endless;
     if (cyclic) {
         b->members.count = 0;
-        uint32_t *members = extend(&b->members, count);
+        uint32_t *members = pl_array_extend(&b->members, count);
         if (!members) return pl_fail_memory(b->error, "building the states");
         for (size_t i = 0; i < count; i++) {
             pl_state *state = &states->list[members[i] = open[i].state];
@@ -521,7 +501,7 @@ bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree 
     ok = ok && explore(&b);
     pl_walk_end(&b.walk);
     free(b.scope.parameters);
-    array *arrays[] = {&b.items, &b.chain, &b.path, &b.visits, &b.open, &b.members, &b.scopes, &b.trails, &b.trail_counts, &b.key};
+    pl_array *arrays[] = {&b.items, &b.chain, &b.path, &b.visits, &b.open, &b.members, &b.scopes, &b.trails, &b.trail_counts, &b.key};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]->data);
     if (!ok) pl_states_free(states);
     return ok;

@@ -172,24 +172,6 @@ bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *q
 
 /* --- from a trail to the items on the path --- */
 
-static bool add_items(pl_items *items, const pl_front *front, uint32_t opened, const pl_item *last)
-{
-    size_t begin = items->count, count = 1;
-    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent]) count++;
-    if (begin + count > items->capacity) {
-        size_t capacity = 2 * (begin + count) + 16;
-        const pl_item **list = realloc(items->list, capacity * sizeof *list);
-        if (!list) return false;
-        items->list = list;
-        items->capacity = capacity;
-    }
-    items->count = begin + count;
-    items->list[begin + --count] = last;
-    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent])
-        items->list[begin + --count] = at->item;
-    return true;
-}
-
 static bool trail_items(const pl_scene *scene, const pl_path *trail, pl_items *items)
 {
     const pl_fronts *fronts = scene->structure;
@@ -197,11 +179,11 @@ static bool trail_items(const pl_scene *scene, const pl_path *trail, pl_items *i
     items->count = 0;
     for (uint32_t i = 0; i + 1 < trail->length; i++) {
         const pl_front_instance *instance = &front->instances[trail->terms[i]];
-        if (!add_items(items, front, instance->opened, instance_item(scene, front, trail->terms[i]))) return false;
+        if (!pl_front_add_items(items, front, instance->opened, instance_item(scene, front, trail->terms[i]))) return false;
         front = &fronts->list[instance->front];
     }
     const pl_front_primitive *leaf = &front->primitives[trail->terms[trail->length - 1] & PL_REF_INDEX];
-    return add_items(items, front, leaf->opened, pl_front_item(&scene->states, front, leaf->opened, leaf->item));
+    return pl_front_add_items(items, front, leaf->opened, pl_front_item(&scene->states, front, leaf->opened, leaf->item));
 }
 
 /* --- which kernel --- */

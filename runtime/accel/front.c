@@ -292,3 +292,21 @@ void pl_fronts_count(const pl_scene *scene, pl_statistics *counts)
     counts->front_entries = fronts->entries;
     counts->front_pilot_seconds = fronts->pilot_seconds;
 }
+
+bool pl_front_add_items(pl_items *items, const pl_front *front, uint32_t opened, const pl_item *last)
+{
+    size_t begin = items->count, count = 1;
+    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent]) count++;
+    if (begin + count > items->capacity) {
+        size_t capacity = 2 * (begin + count) + 16;
+        const pl_item **list = realloc(items->list, capacity * sizeof *list);
+        if (!list) return false;
+        items->list = list;
+        items->capacity = capacity;
+    }
+    items->count = begin + count;
+    items->list[begin + --count] = last;
+    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent])
+        items->list[begin + --count] = at->item;
+    return true;
+}

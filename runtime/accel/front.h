@@ -96,6 +96,9 @@ static inline const pl_item *pl_front_item(const pl_states *states, const pl_fro
     return &states->list[by ? by->what : front->state].items[item & ~PL_NO_SHADOW];
 }
 
+/* Adds the items on the way through a front: those of the states opened down to `opened`, then `last`. false: no memory. */
+bool pl_front_add_items(pl_items *items, const pl_front *front, uint32_t opened, const pl_item *last);
+
 typedef struct pl_fronts {
     pl_front *list; /* 0: the scene */
     uint32_t count;

@@ -120,22 +120,10 @@ void pl_compositions_free(pl_compositions *compositions)
 
 /* --- items --- */
 
-static float round_down(double x)
-{
-    float f = (float)x;
-    return (double)f > x ? nextafterf(f, -INFINITY) : f;
-}
-
-static float round_up(double x)
-{
-    float f = (float)x;
-    return (double)f < x ? nextafterf(f, INFINITY) : f;
-}
-
 /* A bound, and what its rounding to single precision and that of sums with it lose. */
 static float bound(double x)
 {
-    return round_up(x * (1.0 + 0x1p-20));
+    return pl_round_up(x * (1.0 + 0x1p-20));
 }
 
 static double length(const double v[3])
@@ -175,8 +163,8 @@ static void set_box(opening *o, size_t index, const pl_box *box, bool unbounded,
     boxed->ref = ref;
     boxed->zero = 0.0f;
     for (int axis = 0; axis < 3; axis++) {
-        boxed->lo[axis] = round_down((box->lo[axis] - o->front->centre[axis]) * o->front->scale);
-        boxed->hi[axis] = round_up((box->hi[axis] - o->front->centre[axis]) * o->front->scale);
+        boxed->lo[axis] = pl_round_down((box->lo[axis] - o->front->centre[axis]) * o->front->scale);
+        boxed->hi[axis] = pl_round_up((box->hi[axis] - o->front->centre[axis]) * o->front->scale);
     }
     const bool empty = box->lo[0] > box->hi[0]; /* which NaN isn't */
     if (unbounded || !(empty || (pl_box_is_finite(box) && o->front->framed))) boxed->lo[0] = NAN;
@@ -199,7 +187,7 @@ static void add_primitive(opening *o, const chain *at, const pl_item *item, uint
         p->columns[9 + r] =
             (float)(m[4 * r] * centre[0] + m[4 * r + 1] * centre[1] + m[4 * r + 2] * centre[2] + m[4 * r + 3]);
     }
-    p->stretch = round_up(sqrt(square) * (1.0 + 0x1p-20));
+    p->stretch = pl_round_up(sqrt(square) * (1.0 + 0x1p-20));
     p->argument = (float)item->arguments[0];
     p->opened = (uint32_t)o->opened - 1;
     p->item = index | (no_shadow ? PL_NO_SHADOW : 0);

@@ -225,24 +225,6 @@ int pl_gated_arrive(pl_tracer *tracer, uint32_t frame, uint32_t instance, bool c
 
 /* --- from a trail to the items on the path --- */
 
-static bool add_items(pl_items *items, const pl_front *front, uint32_t opened, const pl_item *last)
-{
-    size_t begin = items->count, count = 1;
-    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent]) count++;
-    if (begin + count > items->capacity) {
-        size_t capacity = 2 * (begin + count) + 16;
-        const pl_item **list = realloc(items->list, capacity * sizeof *list);
-        if (!list) return false;
-        items->list = list;
-        items->capacity = capacity;
-    }
-    items->count = begin + count;
-    items->list[begin + --count] = last;
-    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent])
-        items->list[begin + --count] = at->item;
-    return true;
-}
-
 static bool trail_items(const pl_scene *scene, const pl_path *trail, pl_items *items)
 {
     const pl_gated *gated = scene->structure;
@@ -259,7 +241,7 @@ static bool trail_items(const pl_scene *scene, const pl_path *trail, pl_items *i
             opened = front->primitives[ref & PL_REF_INDEX].opened;
             item = front->primitives[ref & PL_REF_INDEX].item;
         }
-        if (!add_items(items, front, opened, pl_front_item(&scene->states, front, opened, item))) return false;
+        if (!pl_front_add_items(items, front, opened, pl_front_item(&scene->states, front, opened, item))) return false;
     }
     return true;
 }

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../array.h"
 #include "../error.h"
 #include "../random.h"
 #include "lazy.h"
@@ -35,16 +36,11 @@ typedef struct draft {
     size_t transform_first, term_first, scope_first, scope_count;
 } draft;
 
-typedef struct growing {
-    void *data;
-    size_t count, capacity, element;
-} growing;
-
 struct pl_unfolder {
     const pl_scene *scene;
     pl_walk walk;
     pl_scope scope;
-    growing drafts, chain, transforms, computed, terms, scopes, key;
+    pl_array drafts, chain, transforms, computed, terms, scopes, key;
     uint64_t work;
     size_t entered; /* drafts of states */
 };
@@ -54,20 +50,6 @@ typedef struct link {
     const pl_transform *constant;
     size_t computed;
 } link_;
-
-static void *extend(growing *a, size_t more)
-{
-    if (a->count + more > a->capacity || !a->data) {
-        size_t capacity = 2 * (a->count + more) + 8;
-        void *data = realloc(a->data, capacity * a->element);
-        if (!data) return NULL;
-        a->data = data;
-        a->capacity = capacity;
-    }
-    void *place = (char *)a->data + a->count * a->element;
-    a->count += more;
-    return place;
-}
 
 pl_unfolder *pl_unfolder_create(const pl_scene *scene, pl_error *error)
 {
@@ -95,7 +77,7 @@ void pl_unfolder_free(pl_unfolder *u)
     if (!u) return;
     pl_walk_end(&u->walk);
     free(u->scope.parameters);
-    growing *arrays[] = {&u->drafts, &u->chain, &u->transforms, &u->computed, &u->terms, &u->scopes, &u->key};
+    pl_array *arrays[] = {&u->drafts, &u->chain, &u->transforms, &u->computed, &u->terms, &u->scopes, &u->key};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]->data);
     free(u);
 }
@@ -106,13 +88,13 @@ static bool add_transform(pl_unfolder *u)
 {
     link_ l = {u->walk.transform, 0};
     if (l.constant == &u->walk.computed) {
-        pl_transform *kept = extend(&u->computed, 1);
+        pl_transform *kept = pl_array_extend(&u->computed, 1);
         if (!kept) return false;
         *kept = u->walk.computed;
         l = (link_){NULL, u->computed.count - 1};
     }
     u->chain.count = u->walk.at.marks[0]++;
-    link_ *place = extend(&u->chain, 1);
+    link_ *place = pl_array_extend(&u->chain, 1);
     if (place) *place = l;
     return place != NULL;
 }
@@ -159,22 +141,22 @@ static bool add_draft(pl_unfolder *u, pl_classes *classes, uint8_t kind, uint32_
                .scope_first = u->scopes.count};
     if (kind == PL_NODE_PRIMITIVE) memcpy(d.it.item.arguments, walk->arguments, sizeof d.it.item.arguments);
     bound(u, classes, &d);
-    link_ *transforms = extend(&u->transforms, d.it.item.transform_count);
-    uint32_t *terms = extend(&u->terms, d.it.item.term_count);
+    link_ *transforms = pl_array_extend(&u->transforms, d.it.item.transform_count);
+    uint32_t *terms = pl_array_extend(&u->terms, d.it.item.term_count);
     if (!transforms || !terms) return false;
     if (d.it.item.transform_count) memcpy(transforms, u->chain.data, d.it.item.transform_count * sizeof *transforms);
     if (d.it.item.term_count) memcpy(terms, walk->path.terms, d.it.item.term_count * sizeof *terms);
     u->entered += kind == PL_NODE_ENTER;
     if (kind == PL_NODE_ENTER) {
         d.scope_count = pl_scope_words(walk->program, &walk->scope) - walk->scope.draws;
-        uint64_t *words = extend(&u->scopes, d.scope_count);
+        uint64_t *words = pl_array_extend(&u->scopes, d.scope_count);
         if (!words) return false;
         /* Draws end with the application. */
         pl_scope entered = walk->scope;
         entered.draws = 0;
         pl_scope_pack(walk->program, &entered, words);
     }
-    draft *place = extend(&u->drafts, 1);
+    draft *place = pl_array_extend(&u->drafts, 1);
     if (place) *place = d;
     return place != NULL;
 }
@@ -418,7 +400,7 @@ static bool make_key(pl_unfolder *u, uint32_t symbol)
     u->key.count = 0;
     if (symbol == UINT32_MAX) return true;
     const pl_node *node = &program->nodes[symbol];
-    uint64_t *key = extend(&u->key, node->as.symbol.live_count + 1);
+    uint64_t *key = pl_array_extend(&u->key, node->as.symbol.live_count + 1);
     if (!key) return false;
     *key++ = node->as.symbol.draws ? u->scope.key : 0;
     for (uint32_t i = 0; i < node->as.symbol.live_count; i++) {

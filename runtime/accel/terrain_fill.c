@@ -262,18 +262,6 @@ static void fill(const pl_scene *scene, job *j)
 
 /* --- boxes --- */
 
-static float round_down(double x)
-{
-    float f = (float)x;
-    return (double)f > x ? nextafterf(f, -INFINITY) : f;
-}
-
-static float round_up(double x)
-{
-    float f = (float)x;
-    return (double)f < x ? nextafterf(f, INFINITY) : f;
-}
-
 /* Quantises outward, by what the kernels make of it: lo + q * step. */
 static uint8_t plane_below(float lo, float step, float x)
 {
@@ -309,8 +297,8 @@ static void join_corners(pl_boxed *box, double corners[3][3])
 {
     for (int i = 0; i < 3; i++)
         for (int axis = 0; axis < 3; axis++) {
-            box->lo[axis] = fminf(box->lo[axis], round_down(corners[i][axis]));
-            box->hi[axis] = fmaxf(box->hi[axis], round_up(corners[i][axis]));
+            box->lo[axis] = fminf(box->lo[axis], pl_round_down(corners[i][axis]));
+            box->hi[axis] = fmaxf(box->hi[axis], pl_round_up(corners[i][axis]));
         }
 }
 

@@ -54,6 +54,13 @@ def figure(bench: Bench) -> None:
         )  # fmt: skip
 
 
+def memory(bench: Bench, case: Case, last: tuple[dict, dict], megabytes: float, percent: float) -> None:
+    """Rows of what the scene's structures take, and of their share of Embree's; ``last`` is a round's two answers."""
+    ours, theirs = last[0]["scene_bytes"], last[1]["bytes"]
+    bench.results.row(case.name, "memory", ours / 1e6, megabytes, " MB", at_most=True, theirs=size(theirs))
+    bench.results.row(case.name, "memory, of Embree's", 100 * ours / theirs, percent, " %", at_most=True)
+
+
 def order20(bench: Bench) -> None:
     """DESIGN's tree of order 20: 2,097,153 cylinders."""
     case = Case("order 20", "tree", {"order": 20}, bench.folder)
@@ -62,23 +69,7 @@ def order20(bench: Bench) -> None:
         bench, case, scene, {}, {"coherent": 1.0, "random": 2.0}, "of Embree flat, single rays"
     )
     if last:
-        bench.results.row(
-            case.name,
-            "memory",
-            last[0]["scene_bytes"] / 1e6,
-            1,
-            " MB",
-            at_most=True,
-            theirs=size(last[1]["bytes"]),
-        )
-        bench.results.row(
-            case.name,
-            "memory, of Embree's",
-            100 * last[0]["scene_bytes"] / last[1]["bytes"],
-            0.5,
-            " %",
-            at_most=True,
-        )
+        memory(bench, case, last, 1, 0.5)
         same_hits(bench, case, last[1])
     sixteen = Case("order 16", "tree", {"order": 16}, bench.folder)
     flat = [ours(sixteen, options={"front_items": ALL}, repeats=1) for _ in range(bench.rounds)]
@@ -170,23 +161,7 @@ def forest(bench: Bench) -> None:
         bench, case, scene, {}, {"coherent": 1.6, "random": 1.6}, f"of Embree two-level, {len(groups)} kinds"
     )
     if last:
-        bench.results.row(
-            case.name,
-            "memory",
-            last[0]["scene_bytes"] / 1e6,
-            4,
-            " MB",
-            at_most=True,
-            theirs=size(last[1]["bytes"]),
-        )
-        bench.results.row(
-            case.name,
-            "memory, of Embree's",
-            100 * last[0]["scene_bytes"] / last[1]["bytes"],
-            12,
-            " %",
-            at_most=True,
-        )
+        memory(bench, case, last, 4, 12)
         same_hits(bench, case, last[1])
 
 
