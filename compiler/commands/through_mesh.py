@@ -23,7 +23,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..export.mesh import agrees, export_mesh, read_back
     from ..export.mesh_scene import mesh_graph
     from ..export.povray_run import peak_rss
-    from .compare import render_ours, report
+    from .comparison import render_ours, report
     from .differences import clipped, edges, statistics
 
     started = time.perf_counter()

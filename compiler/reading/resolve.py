@@ -122,21 +122,11 @@ class Resolver:
 
     def constant_of(self, entry: Entry, span: Span) -> Value:
         """The value of a declared constant or an input, worked out when first asked for. Raises Problem."""
-        if entry.busy:
-            raise Problem("wrong-value", span, f"'{entry.definition.name}' is declared through itself")
-        if entry.failed:
-            raise Problem
-        if entry.value is None:
-            entry.busy = True
-            try:
-                entry.value = self._value_of(entry)
-            except Problem:
-                entry.failed = True
-                raise
-            finally:
-                entry.busy = False
-        assert isinstance(entry.value, Value)
-        return entry.value
+        value = entry.once(
+            lambda: self._value_of(entry), span, f"'{entry.definition.name}' is declared through itself"
+        )
+        assert isinstance(value, Value)
+        return value
 
     def _value_of(self, entry: Entry) -> Value:
         node = entry.node

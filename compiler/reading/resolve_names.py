@@ -87,6 +87,24 @@ class Entry:
     def kind(self) -> str:
         return self.definition.kind
 
+    def once(self, make: Callable[[], object], span: Span, through_itself: str):
+        """``value``, made when first asked for. Raises Problem: of its own where it is asked for while it is made, and
+        one reported already where that failed before."""
+        if self.busy:
+            raise Problem("wrong-value", span, through_itself)
+        if self.failed:
+            raise Problem
+        if self.value is None:
+            self.busy = True
+            try:
+                self.value = make()
+            except Problem:
+                self.failed = True
+                raise
+            finally:
+                self.busy = False
+        return self.value
+
 
 @dataclass
 class Names:

@@ -147,21 +147,11 @@ class Objects:
         return Placed(inner.operand, inner.compound, list(inner.modifiers), inner.look)
 
     def _declared(self, entry: Entry, name: syntax.Name) -> Placed:
-        if entry.busy:
-            raise Problem("wrong-value", name.span, f"the object '{name.name}' contains itself")
-        if entry.failed:
-            raise Problem
-        if entry.value is None:
-            assert isinstance(entry.node, syntax.Declare)
-            entry.busy = True
-            try:
-                entry.value = self._declaration(entry.node)
-            except Problem:
-                entry.failed = True
-                raise
-            finally:
-                entry.busy = False
-        value = entry.value
+        assert isinstance(entry.node, syntax.Declare)
+        node = entry.node
+        value = entry.once(
+            lambda: self._declaration(node), name.span, f"the object '{name.name}' contains itself"
+        )
         assert isinstance(value, Placed)
         return Placed(value.operand, value.compound, list(value.modifiers), value.look)
 

@@ -93,21 +93,9 @@ class Textures:
 
     def declared(self, entry: Entry, span: Span):
         """The Look, Pigment, finish or colour map that ``entry`` declares, made once. Raises Problem."""
-        if entry.busy:
-            name = entry.definition.name
-            raise Problem("wrong-value", span, f"'{name}' is declared through itself")
-        if entry.failed:
-            raise Problem
-        if entry.value is None:
-            entry.busy = True
-            try:
-                entry.value = self._declared(entry)
-            except Problem:
-                entry.failed = True
-                raise
-            finally:
-                entry.busy = False
-        return entry.value
+        return entry.once(
+            lambda: self._declared(entry), span, f"'{entry.definition.name}' is declared through itself"
+        )
 
     def _declared(self, entry: Entry):
         node = entry.node

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from plsys.compiler.cli import main
-from plsys.compiler.commands.compare import passes
+from plsys.compiler.commands.comparison import passes
 from plsys.compiler.commands.differences import Camera, classify, edges, statistics
 from plsys.compiler.export.povray import values_of
 from plsys.compiler.export.retrace import Retracer
