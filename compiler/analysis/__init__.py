@@ -22,7 +22,7 @@ from ..reading.diagnostics import Diagnostic, PlsysError, nearest
 from ..reading.source import Span
 from .context import Context, context_at
 from . import queries
-from .actions import Action, TextEdit
+from .actions import Action, TextEdit, line_break
 from .document import Document, Meaning, Message, Outline, Place
 from .facts import Definition, Facts, Name, facts_of
 from .keys import enters_keys
@@ -43,5 +43,5 @@ __all__ = [
     "Action", "Block", "CODES", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Folders",
     "Formatted", "Found", "GuardInsight", "Insight", "Meaning", "Message", "Motion", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
     "SCENE_SUFFIX", "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "enters_keys", "facts_of", "fix_all", "fixes",
-    "format_document", "ignoring", "insights_in", "insights_of", "motion_of", "nearest", "prepare_format", "queries", "refactorings", "syntax", "vocabulary",
+    "format_document", "ignoring", "insights_in", "insights_of", "line_break", "motion_of", "nearest", "prepare_format", "queries", "refactorings", "syntax", "vocabulary",
 ]  # fmt: skip

@@ -5,6 +5,7 @@ Example: for "missing ';' after this rule", ``Action("Add ';'", "quickfix", (Tex
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Iterator, NamedTuple
 
@@ -94,6 +95,12 @@ class Spot:
         rest = text.slice(end, max(end, text.line_start(text.line_of(end) + 1)))
         is_comment = rest.strip().startswith(b"//") or not rest.strip()
         return end + len(rest.rstrip(b"\r\n")) if is_comment else end
+
+
+def line_break(document: Document) -> str:
+    """How the document's first line ends."""
+    found = re.search(rb"\r\n|\n|\r", document.text.slice(0, document.text.line_start(1)) if document.text.line_count > 1 else b"")
+    return found[0].decode() if found else "\n"
 
 
 def fresh_name(scene: Scene, *wanted: str) -> str:

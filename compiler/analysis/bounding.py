@@ -10,7 +10,8 @@ Example: ``Selection A { A -> box + T A; }`` becomes
 from __future__ import annotations
 
 from ..reading import syntax
-from .actions import Spot, TextEdit, fresh_name, name_of, rules, terms
+from .actions import Spot, TextEdit, fresh_name, name_of, rules, terms, uses_at
+from .document import Place
 from .facts import facts_of
 from .scene import Scene
 
@@ -31,6 +32,29 @@ def leads_back(scene: Scene, node: syntax.Selection) -> set[str]:
     return found
 
 
+def _has_other_entrance(scene: Scene, node: syntax.Selection, back: set[str]) -> bool:
+    """Whether another Selection of the recursion is entered from outside of it: references to ``node`` from there don't
+    run its entry action, so the counter would have no value."""
+    reached, waiting = set(), [node.name.name]
+    while waiting:
+        meaning = scene.meaning(waiting.pop())
+        if meaning is not None and isinstance(meaning.node, syntax.Selection):
+            new = produced_names(meaning.node) - reached
+            reached |= new
+            waiting += new
+    others = (reached & back) - {node.name.name}
+    return any(_owner(place) not in reached for name in others for place in uses_at(scene, name))
+
+
+def _owner(place: Place) -> str:
+    """The Selection round a place; '' for a scene block."""
+    block, base = place.document.text.block_at(place.start)
+    for node in facts_of(block).file.definitions:
+        if isinstance(node, syntax.Selection) and node.span.start <= place.start - base < node.span.end:
+            return node.name.name
+    return ""
+
+
 def produced_names(node: syntax.Selection) -> set[str]:
     """The names that a Selection's productions have."""
     bodies = (term for production in node.productions for term in terms(production))
@@ -40,7 +64,7 @@ def produced_names(node: syntax.Selection) -> set[str]:
 def bounded(spot: Spot, node: syntax.Selection) -> list[TextEdit]:
     """The edits that bound the recursion of ``node``; none if it isn't recursive or nothing has a place for them."""
     back = leads_back(spot.scene, node)
-    if node.name.name not in back or not node.productions:
+    if node.name.name not in back or not node.productions or _has_other_entrance(spot.scene, node, back):
         return []
     counter, base = fresh_name(spot.scene, "rounds"), spot.base
     edits = [_entry(spot, node, base, counter)]

@@ -18,6 +18,7 @@ _TOKEN = re.compile(
     rb"//[^\r\n]*|/\*(?:[^*]|\*(?!/))*(?:\*/)?|(?P<string>\"(?:[^\"\\\r\n]|\\[^\r\n])*\"?)|(?P<word>#?[A-Za-z_]\w*)"
     rb"|(?P<number>\.?\d[\w.]*)|(?P<mark>->|=>|\+\+|--|[-+*/%<>=!&|]=|&&|\|\||[^\s\w])"
 )
+_IGNORE = re.compile(rb"plsys-ignore:(?:[ \t]*[\w-]+[ \t]*,)*[ \t]*([\w-]*)$", re.ASCII)
 _KEYWORDS = {"Selection", "Calculation", "Transformation", "Parameter", "Texture", "#declare", "#local", "#include"}
 _BODIES = {"Selection": "selection", "Calculation": "calculation", "Transformation": "transformation"}
 
@@ -29,8 +30,9 @@ class Context(NamedTuple):
     - ``selection``: where a rule, a guard or the entry action starts · ``production``: right of an arrow
     - ``statement``: where a statement starts, in a ``calculation``, ``transformation`` or ``inline`` (``owner`` tells the kind)
     - ``arguments``: values of the operation ``function`` · ``call``: inside the brackets of ``function``
+    - ``step``: what ``++`` or ``--`` counts · ``input``: a Parameter's value, in its range if ``function`` is ``[``
     - ``expression``: a value, such as a guard's · ``block``: items of a scene block · ``declare``: the value of a #declare
-    - ``comment``, ``string``: nothing can be completed
+    - ``ignore``: the codes of a ``plsys-ignore`` comment · ``comment``, ``string``: nothing can be completed
 
     ``owner`` is the definition's name (of statements: the kind of body), ``blocks`` the scene blocks round the cursor,
     outermost first, ``function`` the call or operation with ``argument`` counting from 0, ``prefix`` the part of a word
@@ -45,6 +47,12 @@ class Context(NamedTuple):
     previous: str = ""
 
 
+class _Token(str):
+    """A token; ``touches`` the one before it, or has a space between."""
+
+    touches: bool = False
+
+
 class _Open(NamedTuple):
     """A bracket that is open: its mark, what stands before it, and the number of the token after it."""
 
@@ -57,28 +65,33 @@ def context_at(document: Document, offset: int) -> Context:
     """The context at ``offset``."""
     block, base = document.text.block_at(max(0, offset - 1))
     text = block.data[: offset - base]
-    tokens: list[str] = []
+    tokens: list[_Token] = []
+    end = -1
     for match in _TOKEN.finditer(text):
         if match.lastgroup is None:
             comment = match[0]
             if match.end() == len(text) and not (comment.startswith(b"/*") and comment.endswith(b"*/") and len(comment) > 3):
-                return Context("comment")
+                ignored = _IGNORE.search(comment)
+                return Context("ignore", prefix=ignored[1].decode()) if ignored else Context("comment")
             continue
-        tokens.append(match[0].decode(errors="replace"))
+        tokens.append(_Token(match[0].decode(errors="replace")))
+        tokens[-1].touches, end = match.start() == end, match.end()
     prefix = ""
     if tokens and re.fullmatch(r"#?[A-Za-z_]\w*|#", tokens[-1]) and text.endswith(tokens[-1].encode()):
         prefix = tokens.pop()
     elif tokens and tokens[-1].startswith('"') and text.endswith(tokens[-1].encode()) and not _is_closed(tokens[-1]):
         kind = "include" if tokens[:-1][-1:] == ["#include"] else "string"
         return Context(kind, prefix=tokens[-1][1:], previous=tokens[-2] if len(tokens) > 1 else "")
-    return _classified(tokens, prefix)
+    typed = text[: len(text) - len(prefix.encode())]
+    starts_line = typed.endswith((b"\n", b"\r"))
+    return _classified(tokens, prefix, starts_line)
 
 
 def _is_closed(text: str) -> bool:
     return len(text) > 1 and text.endswith('"')
 
 
-def _classified(tokens: list[str], prefix: str) -> Context:
+def _classified(tokens: list[_Token], prefix: str, starts_line: bool) -> Context:
     start = max((i for i, token in enumerate(tokens) if token in _KEYWORDS), default=0)
     head = tokens[start] if tokens and tokens[start] in _KEYWORDS else ""
     owner = tokens[start + 1] if head and len(tokens) > start + 1 else ""
@@ -86,7 +99,10 @@ def _classified(tokens: list[str], prefix: str) -> Context:
     for i in range(start, len(tokens)):
         token = tokens[i]
         if token in "{[(":
-            opens.append(_Open(token, tokens[i - 1] if i else "", i + 1))
+            before = tokens[i - 1] if i else ""
+            # With a space between, a bracket of a rule isn't a call's.
+            is_apart = token == "(" and head == "Selection" and opens and not token.touches and before not in ("if", "else")
+            opens.append(_Open(token, "" if is_apart else before, i + 1))
         elif token in "}])" and opens:
             opens.pop()
             if not opens and token == "}":
@@ -98,19 +114,21 @@ def _classified(tokens: list[str], prefix: str) -> Context:
         kind = "name" if head != "#include" else "include"
         return Context(kind, prefix=prefix, previous=previous)
     if not opens:
-        kind = {"#declare": "declare", "#local": "declare", "Parameter": "expression"}.get(head, "top")
+        kind = {"#declare": "declare", "#local": "declare", "Parameter": "input"}.get(head, "top")
+        if previous == ";" or starts_line and re.fullmatch(r"[\w.]+|[\])}>]|\".*", previous):
+            return Context("top", prefix=prefix, previous=previous)
         return Context(kind, owner, prefix=prefix, previous=previous)
     return _inside(tokens, opens, head, owner, prefix, previous)
 
 
-def _inside(tokens: list[str], opens: list[_Open], head: str, owner: str, prefix: str, previous: str) -> Context:
+def _inside(tokens: list[_Token], opens: list[_Open], head: str, owner: str, prefix: str, previous: str) -> Context:
     inner = opens[-1]
     since = tokens[inner.at :]
     if inner.mark == "(" and re.fullmatch(r"[A-Za-z_]\w*", inner.before) and inner.before not in ("if", "else"):
         if opens[0] is inner and head == "Selection":
             return Context("name", owner, prefix=prefix, previous=previous)
         return Context("call", owner, (), inner.before, _commas(since), prefix, previous)
-    if head in _BODIES or inner.mark == "[" and head == "":
+    if head in _BODIES:
         body = _BODIES.get(head, "")
         if inner.mark == "[" and body == "selection":
             return _statement(since, "inline", prefix, previous)
@@ -123,6 +141,8 @@ def _inside(tokens: list[str], opens: list[_Open], head: str, owner: str, prefix
             kind = "production" if "->" in statement else "selection"
             return Context(kind, owner, prefix=prefix, previous=previous)
         return Context("expression", owner, prefix=prefix, previous=previous)
+    if head == "Parameter":
+        return Context("input", owner, (), inner.mark, 0, prefix, previous)
     blocks = tuple(_block_name(each, head) for each in opens if each.mark == "{")
     return Context("block", owner if head else "", blocks, prefix=prefix, previous=previous)
 
@@ -131,18 +151,39 @@ def _block_name(each: _Open, head: str) -> str:
     return "texture" if head == "Texture" and each.at == 3 else each.before
 
 
-def _statement(since: list[str], body: str, prefix: str, previous: str) -> Context:
+def _statement(since: list[_Token], body: str, prefix: str, previous: str) -> Context:
     statement = _last_statement(since)
     if not statement:
         return Context("statement", body, prefix=prefix, previous=previous)
+    if statement in (["++"], ["--"]):
+        return Context("step", body, prefix=prefix, previous=previous)
     if any(mark in statement for mark in ("=", "+=", "-=", "*=", "/=")):
         return Context("expression", body, prefix=prefix, previous=previous)
     commas = _commas(statement)
-    values = [token for token in statement[1:] if re.match(r"[\w.]", token)]
-    return Context("arguments", body, (), statement[0], commas or len(values), prefix, previous)
+    return Context("arguments", body, (), statement[0], commas or _values(statement[1:]), prefix, previous)
 
 
-def _last_statement(tokens: list[str]) -> list[str]:
+def _values(tokens: list[_Token]) -> int:
+    """How many arguments stand side by side. A sign that touches what follows, and nothing before it, begins one."""
+    count = depth = 0
+    goes_on = False  # an operator's right side is awaited
+    for i, token in enumerate(tokens):
+        touches_next = i + 1 < len(tokens) and tokens[i + 1].touches
+        is_sign = token in "+-!" and touches_next and not token.touches
+        if depth == 0 and (re.match(r"[\w.]", token) or token == "(" and not token.touches):
+            count += not goes_on
+            goes_on = False
+        elif depth == 0 and is_sign:
+            count += not goes_on
+            goes_on = True
+        elif depth == 0 and token not in "()":
+            goes_on = True
+        depth += (token == "(") - (token == ")")
+    awaited = goes_on and not (tokens[-1] in "+-" and not tokens[-1].touches)
+    return max(0, count - awaited)
+
+
+def _last_statement(tokens: list[_Token]) -> list[_Token]:
     ends = [i for i, token in enumerate(tokens) if token in ";"]
     return tokens[ends[-1] + 1 :] if ends else tokens
 

@@ -64,8 +64,18 @@ def _extract(spot: Spot) -> Iterator[Action]:
             start, end = spot.base + item.span.start, spot.base + item.span.end
             at_end = spot.after_definition()
             new = f"\n{kind} {name} {{ {_statements(spot, item.statements)}; }}"
-            edits = (spot.edit(start, end, name), spot.edit(at_end, at_end, new))
+            edits = (spot.edit(start, end, _apart(spot, start, end, name)), spot.edit(at_end, at_end, new))
             yield Action(f"Extract {kind} '{name}'", "refactor.extract", edits)
+
+
+def _apart(spot: Spot, start: int, end: int, name: str) -> str:
+    """``name`` with spaces where it would touch the words round bytes ``start`` to ``end``."""
+    before, after = spot.slice(max(0, start - 1), start), spot.slice(end, end + 1)
+    return f"{' ' * _is_word(before)}{name}{' ' * (_is_word(after) or after == '(')}"
+
+
+def _is_word(text: str) -> bool:
+    return text.isalnum() or text == "_"
 
 
 def _kind(statement: syntax.Statement) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, Iterator
 
-from plsys.compiler.analysis import Action, Message, fix_all, fixes, ignoring, refactorings
+from plsys.compiler.analysis import Action, Message, fix_all, fixes, ignoring, line_break, refactorings
 from plsys.lsp.request import Feature, Request
 
 KINDS = ("quickfix", "refactor.extract", "refactor.inline", "refactor.rewrite", "source.fixAll")
@@ -45,7 +45,8 @@ def _protocol(request: Request, action: Action) -> dict[str, Any]:
     edits: dict[Any, list[dict]] = {}
     for edit in sorted(action.edits, key=lambda each: each.start):
         range_ = workspace.positions(edit.document).range(edit.start, edit.end)
-        edits.setdefault(edit.document, []).append({"range": range_, "newText": edit.text})
+        text = edit.text.replace("\n", line_break(edit.document)) if "\n" in edit.text else edit.text
+        edits.setdefault(edit.document, []).append({"range": range_, "newText": text})
     if request.supports("workspace", "workspaceEdit", "documentChanges"):
         changes: dict[str, Any] = {
             "documentChanges": [

@@ -13,7 +13,8 @@ from typing import Any
 
 from plsys.compiler.analysis import context_at
 from plsys.lsp import candidates, describe, prose
-from plsys.lsp.candidates import Candidate, detailed, fit
+from plsys.lsp.candidates import Candidate, detailed
+from plsys.lsp.place import fit
 from plsys.lsp.request import Feature, Request
 
 # More items than this slow down editor and reader; the list then says that it is incomplete.

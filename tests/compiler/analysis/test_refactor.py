@@ -60,6 +60,13 @@ def test_extract_a_calculation_under_a_free_name():
     assert "{ C_new2 A; A ->" in after and "Calculation C_new2 { n = 2; k = n; }\n" in after
 
 
+def test_a_name_does_not_touch_its_neighbours():
+    text = "object { A }\nSelection A { A ->[trans 0 0<cursor> 1]box+[ scale 2 ](sphere); }\n"
+    assert "A ->T_new box+[" in changed(text, "Extract Transformation")
+    text = "object { A }\nSelection A { A ->box+[ scale<cursor> 2 ](sphere); }\n"
+    assert "box+T_new (sphere);" in changed(text, "Extract Transformation")
+
+
 def test_mixed_operators_are_not_extracted():
     assert not [each for each in refactored("Selection A { A -> [ n = 1; tra<cursor>ns 0 0 n ] box; }") if "Extract" in each]
 
@@ -123,6 +130,13 @@ def test_bound_through_another_symbol():
     text = "object { A }\nSelection <cursor>A { A -> box + [ trans 0 0 1 ] B; }\nSelection B { B -> disc + [ trans 0 0 1 ] A; }\n"
     kinds, _ = derivation(HEAD + changed(text, "Bound", keeps=False))
     assert kinds.count("box") == 10 and kinds.count("disc") == 10
+
+
+def test_a_recursion_that_is_entered_elsewhere_gets_no_counter():
+    """A reference from A to B doesn't run B's entry action, since B leads back to A."""
+    text = "object {{ {} }}\nSelection A {{ A -> [ scale 2 ] B; }}\nSelection <cursor>B {{ B -> box + A; }}\n"
+    assert not [each for each in refactored(text.format("A")) if each.startswith("Bound")]
+    assert "Selection B { [ rounds = 10 ] B; if (rounds > 0) B -> box + [ --rounds ] A; }" in changed(text.format("B"), "Bound", keeps=False)
 
 
 def test_only_recursions_are_bounded():

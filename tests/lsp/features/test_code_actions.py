@@ -35,6 +35,13 @@ def test_a_refactoring():
     assert after(editor, action) == "object { A }\nSelection A { A -> T_new box; }\nTransformation T_new { trans 0 0 1; }\n"
 
 
+def test_lines_end_as_in_the_document():
+    for line_break in ("\r\n", "\r"):
+        text = f"object {{ A }}{line_break}Selection A {{ A -> [ trans 0 0 <cursor>1 ] box; }}{line_break}"
+        edits = actions(Editor(text))["Extract Transformation 'T_new'"]["edit"]["changes"]["untitled:scene.plsys"]
+        assert [edit["newText"] for edit in edits] == ["T_new", f"{line_break}Transformation T_new {{ trans 0 0 1; }}"]
+
+
 def test_only_the_wanted_kinds():
     editor = Editor("object { A }\nSelection A { A -> [ trans 0 <cursor>0 1 ] Box; }\n")
     assert {each["kind"] for each in actions(editor, only=["refactor"]).values()} == {"refactor.extract"}
