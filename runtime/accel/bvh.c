@@ -6,9 +6,6 @@
 
 #include "../error.h"
 
-/* Fewer rays don't gain from going together. */
-enum { LEAST_LANES = 3 };
-
 /* --- working memory --- */
 
 static void *work_create(const pl_scene *scene, pl_error *error)
@@ -199,12 +196,8 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     }
 }
 
-/* Whether rays go well together: all directions lie about the first's, and so do the origins, as seen from the scene's
- * size. */
-static bool is_packet(const pl_tracer *tracer, const pl_ray *rays, unsigned count)
+bool pl_bvh_are_alike(const pl_ray *rays, unsigned count, double scale)
 {
-    const double scale = ((const pl_fronts *)tracer->scene->structure)->list->scale;
-    if (tracer->scene->isa == PL_ISA_SCALAR || count <= LEAST_LANES) return false;
     const double *first = rays->direction, near = 0.125 * (fabs(first[0]) + fabs(first[1]) + fabs(first[2]));
     for (unsigned i = 1; i < count; i++)
         for (int axis = 0; axis < 3; axis++) {
@@ -213,7 +206,13 @@ static bool is_packet(const pl_tracer *tracer, const pl_ray *rays, unsigned coun
                 !(fabs(rays[i].origin[axis] - o) * scale < 0.125))
                 return false;
         }
-    return true;
+    return count >= PL_LEAST_LANES;
+}
+
+static bool is_packet(const pl_tracer *tracer, const pl_ray *rays, unsigned count)
+{
+    return tracer->scene->isa != PL_ISA_SCALAR &&
+           pl_bvh_are_alike(rays, count, ((const pl_fronts *)tracer->scene->structure)->list->scale);
 }
 
 static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)

@@ -22,7 +22,10 @@ typedef struct pl_frame {
     double normative_o[3], normative_d[3];
 } pl_frame;
 
-enum { PL_LANES = PL_TRACE_MANY };
+enum {
+    PL_LANES = PL_TRACE_MANY,
+    PL_LEAST_LANES = 4 /* fewer rays don't gain from going together */
+};
 
 typedef struct pl_lanes {
     double o[3][PL_LANES], d[3][PL_LANES];
@@ -57,6 +60,10 @@ extern pl_bvh_kernel pl_bvh_trace_scalar, pl_bvh_trace_avx2, pl_bvh_trace_avx512
 
 typedef bool pl_bvh_packet_kernel(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
 extern pl_bvh_packet_kernel pl_bvh_packet_avx2, pl_bvh_packet_avx512;
+
+/* Whether rays go well together: all directions lie about the first's, and so do the origins, as seen from the size of what
+ * is traced; scale: 1 / half of it. */
+bool pl_bvh_are_alike(const pl_ray *rays, unsigned count, double scale);
 
 /* Evaluates a primitive of a frame normatively and offers it. false: an error. */
 bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query);

@@ -6,6 +6,7 @@
 
 #define KERNEL pl_bvh_trace_avx512
 #define TERRAIN_KERNEL pl_terrain_trace_avx512
+#define TERRAIN_PACKET pl_terrain_packet_avx512
 #define PACKET_KERNEL pl_bvh_packet_avx512
 #define GATED_KERNEL pl_gated_trace_avx512
 
@@ -15,4 +16,5 @@
 #include "kernel_packet.h"
 #include "gated_kernel.h"
 #include "terrain_kernel.h"
+#include "terrain_packet.h"
 #endif

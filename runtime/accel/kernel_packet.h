@@ -433,13 +433,11 @@ static bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, d
     return true;
 }
 
-bool PACKET_KERNEL(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
+/* A packet's rays in a front's unit frame, from the first t that counts; lanes that are left over get the first ray. */
+static inline void load_rays(pl_packet_frame *f, const pl_front *front, const pl_ray *rays, const pl_query *queries, unsigned count,
+                             double *t_max)
 {
-    pl_bvh_work *w = tracer->work;
-    const pl_front *front = ((const pl_fronts *)tracer->scene->structure)->list;
-    if (!pl_bvh_grow_packets(w, 0, queries->error) || !pl_bvh_grow_packet_stack(w, 0, queries->error)) return false;
-    pl_packet_frame *root = &w->packets[0];
-    double t_max[PL_LANES], t0 = queries->t_min, distance = 0.0;
+    double t0 = queries->t_min, distance = 0.0;
     for (unsigned i = 1; i < count; i++) t0 = queries[i].t_min < t0 ? queries[i].t_min : t0;
     for (unsigned lane = 0; lane < PL_LANES; lane++) {
         const unsigned i = lane < count ? lane : 0;
@@ -448,21 +446,31 @@ bool PACKET_KERNEL(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, uns
         for (int axis = 0; axis < 3; axis++) {
             const double o = rays[i].origin[axis], d = rays[i].direction[axis];
             const double from = (o - front->centre[axis]) * front->scale;
-            root->normative.o[axis][lane] = o;
-            root->normative.d[axis][lane] = d;
-            root->d[axis][lane] = d * front->scale;
-            root->o[axis][lane] = from + t0 * root->d[axis][lane];
+            f->normative.o[axis][lane] = o;
+            f->normative.d[axis][lane] = d;
+            f->d[axis][lane] = d * front->scale;
+            f->o[axis][lane] = from + t0 * f->d[axis][lane];
             away += __builtin_fabs(from);
         }
         distance = away > distance ? away : distance;
     }
-    root->front = w->frames[0].front = front;
-    root->instance = w->frames[0].instance = 0;
-    root->error = 0.0f;
-    root->distance = (float)distance * (1.0f + 0x1p-20f);
-    root->t0 = t0;
-    root->rate = 1.0;
-    root->mapped = (1u << QUADS) - 1;
+    f->front = front;
+    f->instance = 0;
+    f->error = 0.0f;
+    f->distance = (float)distance * (1.0f + 0x1p-20f);
+    f->t0 = t0;
+    f->rate = 1.0;
+    f->mapped = (1u << QUADS) - 1;
+}
+
+bool PACKET_KERNEL(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
+{
+    pl_bvh_work *w = tracer->work;
+    double t_max[PL_LANES];
+    if (!pl_bvh_grow_packets(w, 0, queries->error) || !pl_bvh_grow_packet_stack(w, 0, queries->error)) return false;
+    load_rays(&w->packets[0], ((const pl_fronts *)tracer->scene->structure)->list, rays, queries, count, t_max);
+    w->frames[0].front = w->packets[0].front;
+    w->frames[0].instance = 0;
     const bool ok = visit_packet(tracer, (1u << count) - 1, queries, t_max);
     wide_end();
     return ok;

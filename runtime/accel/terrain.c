@@ -75,15 +75,9 @@ static void map_to_place(const pl_terrain_place *place, const pl_ray *ray, doubl
     for (uint32_t i = 0; i < place->transform_count; i++) pl_map_ray(&place->transforms[i], o, d);
 }
 
-static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
+static bool trace_singles(pl_tracer *tracer, const pl_terrains *terrains, const pl_ray *ray, pl_query *query)
 {
-    const pl_terrains *terrains = tracer->scene->structure;
-    pl_terrain_kernel *kernel = pl_terrain_trace_scalar;
     double o[3], d[3];
-#ifdef __x86_64__
-    if (tracer->scene->isa == PL_ISA_AVX2) kernel = pl_terrain_trace_avx2;
-    if (tracer->scene->isa == PL_ISA_AVX512) kernel = pl_terrain_trace_avx512;
-#endif
     for (uint32_t i = 0; i < terrains->single_count && !query->done; i++) {
         const pl_terrain_single *single = &terrains->singles[i];
         if (query->shadow && single->place.no_shadow) continue;
@@ -99,6 +93,19 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
         tracer->counters.primitive_tests++;
         if (!pl_query_leaf(query, &leaf)) return false;
     }
+    return true;
+}
+
+static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
+{
+    const pl_terrains *terrains = tracer->scene->structure;
+    pl_terrain_kernel *kernel = pl_terrain_trace_scalar;
+    double o[3], d[3];
+#ifdef __x86_64__
+    if (tracer->scene->isa == PL_ISA_AVX2) kernel = pl_terrain_trace_avx2;
+    if (tracer->scene->isa == PL_ISA_AVX512) kernel = pl_terrain_trace_avx512;
+#endif
+    if (!trace_singles(tracer, terrains, ray, query)) return false;
     for (uint32_t i = 0; i < terrains->count && !query->done; i++) {
         const pl_terrain *terrain = &terrains->list[i];
         if (query->shadow && terrain->place.no_shadow) continue;
@@ -106,6 +113,34 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
         if (!kernel(tracer, terrain, o, d, query)) return false;
     }
     return true;
+}
+
+/* Those that don't go well together gain as well: they needn't wait for memory one after another. */
+static bool is_packet(const pl_tracer *tracer, const pl_ray *rays, unsigned count)
+{
+    (void)rays;
+    return tracer->scene->isa != PL_ISA_SCALAR && count >= PL_LEAST_LANES;
+}
+
+static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
+{
+#ifdef __x86_64__
+    const pl_terrains *terrains = tracer->scene->structure;
+    pl_terrain_packet *kernel = tracer->scene->isa == PL_ISA_AVX512 ? pl_terrain_packet_avx512 : pl_terrain_packet_avx2;
+    pl_ray mapped[PL_LANES];
+    for (unsigned k = 0; k < count; k++)
+        if (!trace_singles(tracer, terrains, &rays[k], &queries[k])) return false;
+    for (uint32_t i = 0; i < terrains->count; i++) {
+        const pl_terrain *terrain = &terrains->list[i];
+        if (queries->shadow && terrain->place.no_shadow) continue;
+        for (unsigned k = 0; k < count; k++) map_to_place(&terrain->place, &rays[k], mapped[k].origin, mapped[k].direction);
+        if (!kernel(tracer, terrain, mapped, queries, count)) return false;
+    }
+    return true;
+#else
+    (void)tracer, (void)rays, (void)queries, (void)count;
+    return false;
+#endif
 }
 
 /* --- memory --- */
@@ -165,4 +200,5 @@ void pl_terrains_count(const pl_scene *scene, pl_statistics *counts)
 }
 
 const pl_accel pl_accel_terrain = {
-    .name = "bvh", .destroy = destroy, .work_create = work_create, .work_destroy = work_destroy, .trace = trace};
+    .name = "bvh", .destroy = destroy, .work_create = work_create, .work_destroy = work_destroy, .trace = trace,
+    .is_packet = is_packet, .trace_packet = trace_packet};

@@ -13,7 +13,7 @@
  * were filled. So hits are normative and nothing is derived while tracing.
  *
  *     terrain_find.c  scene -> terrains, or none      terrain_fill.c  terrain -> tiles      terrain.c  rays -> hits
- *     terrain_kernel.h  the traversal, for an instruction set each
+ *     terrain_kernel.h  the traversal, for an instruction set each      terrain_packet.h  the same of many rays
  *
  * Example: 2,097,152 triangles with heights of their own and shared edges take 18.8 bytes each, tree included. */
 #ifndef PL_TERRAIN_H
@@ -80,6 +80,7 @@ typedef struct pl_terrain {
     unsigned char *memory;
     pl_front front;      /* its tree's leaves are tiles */
     size_t node_bytes;
+    size_t stack_need;   /* entries that a ray's stack in the tree has at most */
 } pl_terrain;
 
 typedef struct pl_terrain_single {
@@ -159,6 +160,11 @@ void pl_terrains_count(const pl_scene *scene, pl_statistics *counts);
 typedef bool pl_terrain_kernel(pl_tracer *tracer, const pl_terrain *terrain, const double o[3], const double d[3],
                                pl_query *query);
 extern pl_terrain_kernel pl_terrain_trace_scalar, pl_terrain_trace_avx2, pl_terrain_trace_avx512;
+
+/* The foremost hits of up to PL_LANES rays, which are in the terrain's frame. */
+typedef bool pl_terrain_packet(pl_tracer *tracer, const pl_terrain *terrain, const pl_ray *rays, pl_query *queries,
+                               unsigned count);
+extern pl_terrain_packet pl_terrain_packet_avx2, pl_terrain_packet_avx512;
 
 /* Evaluates a triangle normatively and offers it; o, d: the ray in the terrain's frame. false: an error. */
 bool pl_terrain_candidate(pl_tracer *tracer, const pl_terrain *terrain, uint64_t tile, uint32_t leaf, const double o[3],

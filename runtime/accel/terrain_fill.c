@@ -369,6 +369,18 @@ static bool set_frame(pl_terrain *terrain, const bounds *b)
     return terrain->front.framed && isfinite(state.reach.base) && terrain->front.scale < 1e300;
 }
 
+/* Nodes on the longest way down a tree. */
+static size_t height(const pl_front_node *nodes, pl_ref ref)
+{
+    size_t most = 0;
+    if (ref >> PL_REF_SHIFT != PL_KIND_NODE) return 0;
+    for (int i = 0; i < PL_FRONT_WIDTH; i++) {
+        const size_t below = height(nodes, nodes[ref].child[i]);
+        most = below > most ? below : most;
+    }
+    return 1 + most;
+}
+
 static bool build_tree(pl_terrain *terrain, int threads)
 {
     pl_boxed *boxes = calloc(terrain->tiles, sizeof *boxes);
@@ -376,9 +388,12 @@ static bool build_tree(pl_terrain *terrain, int threads)
     if (!boxes) return false;
     for (uint64_t i = 0; i < terrain->tiles; i++) set_tile(terrain, i, &boxes[i]);
     terrain->front.nodes = pl_front_tree(boxes, terrain->tiles, &count, &terrain->front.root, threads);
-    terrain->node_bytes = count * sizeof *terrain->front.nodes;
     free(boxes);
-    return terrain->front.nodes;
+    if (!terrain->front.nodes) return false;
+    terrain->node_bytes = count * sizeof *terrain->front.nodes;
+    /* All but one child of each node on the way, and the eight that a node writes. */
+    terrain->stack_need = (PL_FRONT_WIDTH - 1) * height(terrain->front.nodes, terrain->front.root) + PL_FRONT_WIDTH + 1;
+    return true;
 }
 
 /* Rays jump about in large terrains; where there are large pages, finding a page's place is what they needn't wait for. */
