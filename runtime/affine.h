@@ -68,14 +68,10 @@ static inline double pl_affine_determinant(const pl_affine *a)
            m[2] * (m[4] * m[9] - m[5] * m[8]);
 }
 
-/* The inverse by the adjugate. false, with *inverse unspecified, if the map is singular: the determinant is 0 or an
- * entry of the inverse isn't finite. */
-static inline bool pl_affine_inverse(const pl_affine *a, pl_affine *inverse)
+/* The inverse, by the adjugate, of a map that is known to have one. */
+static inline void pl_affine_invert(const pl_affine *a, double determinant, pl_affine *inverse)
 {
     const double *m = a->m;
-    const double determinant = pl_affine_determinant(a);
-    if (determinant == 0)
-        return false;
     const double adjugate[9] = {
         m[5] * m[10] - m[6] * m[9], m[2] * m[9] - m[1] * m[10], m[1] * m[6] - m[2] * m[5],
         m[6] * m[8] - m[4] * m[10], m[0] * m[10] - m[2] * m[8], m[2] * m[4] - m[0] * m[6],
@@ -86,10 +82,20 @@ static inline bool pl_affine_inverse(const pl_affine *a, pl_affine *inverse)
         for (int c = 0; c < 3; c++)
             row[c] = adjugate[3 * r + c] / determinant;
         row[3] = -(row[0] * m[3] + row[1] * m[7] + row[2] * m[11]);
-        for (int c = 0; c < 4; c++)
-            if (!(row[c] - row[c] == 0))
-                return false;
     }
+}
+
+/* The same. false, with *inverse unspecified, if the map is singular: the determinant is 0 or an entry of the inverse isn't
+ * finite. */
+static inline bool pl_affine_inverse(const pl_affine *a, pl_affine *inverse)
+{
+    const double determinant = pl_affine_determinant(a);
+    if (determinant == 0)
+        return false;
+    pl_affine_invert(a, determinant, inverse);
+    for (int i = 0; i < 12; i++)
+        if (!(inverse->m[i] - inverse->m[i] == 0))
+            return false;
     return true;
 }
 

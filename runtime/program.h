@@ -67,15 +67,20 @@ typedef struct pl_transform {
 /* What of a map isn't trivial: rays through a translation or a scaling take less arithmetic. */
 typedef enum pl_form { PL_FORM_GENERAL, PL_FORM_DIAGONAL, PL_FORM_TRANSLATION } pl_form;
 
+static inline pl_form pl_form_of(const pl_affine *map)
+{
+    const double *m = map->m;
+    if (m[1] == 0.0 && m[2] == 0.0 && m[4] == 0.0 && m[6] == 0.0 && m[8] == 0.0 && m[9] == 0.0)
+        return m[0] == 1.0 && m[5] == 1.0 && m[10] == 1.0 ? PL_FORM_TRANSLATION : PL_FORM_DIAGONAL;
+    return PL_FORM_GENERAL;
+}
+
 /* Sets to_parent and all that follows from it. */
 static inline void pl_transform_set(pl_transform *transform, const pl_affine *to_parent)
 {
     transform->to_parent = *to_parent;
     transform->singular = !pl_affine_inverse(to_parent, &transform->to_object);
-    const double *m = transform->to_object.m;
-    transform->form = PL_FORM_GENERAL;
-    if (!transform->singular && m[1] == 0.0 && m[2] == 0.0 && m[4] == 0.0 && m[6] == 0.0 && m[8] == 0.0 && m[9] == 0.0)
-        transform->form = m[0] == 1.0 && m[5] == 1.0 && m[10] == 1.0 ? PL_FORM_TRANSLATION : PL_FORM_DIAGONAL;
+    transform->form = transform->singular ? PL_FORM_GENERAL : pl_form_of(&transform->to_object);
 }
 
 /* Settings, camera, light or texture: PL_<RECORD>_VALUES numbers, then PL_<RECORD>_ENTRY numbers an entry. What the

@@ -264,7 +264,8 @@ bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, p
 {
     const pl_accel *accel = tracer->scene->accel;
     bool code;
-    if (!accel->items) return walk_surface(tracer, ray, hit, &hit->path, surface, error);
+    if (accel->path && !accel->path(tracer->scene, &hit->trail, &tracer->scratch)) return pl_fail_memory(error, "shading a hit");
+    if (!accel->items) return walk_surface(tracer, ray, hit, accel->path ? &tracer->scratch : &hit->path, surface, error);
     if (!accel->items(tracer->scene, &hit->trail, &tracer->items)) return pl_fail_memory(error, "shading a hit");
     int64_t textured = innermost_texture(&tracer->items, &code);
     if (!code && !hit->cut_depth) {

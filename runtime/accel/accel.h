@@ -38,7 +38,7 @@ typedef struct pl_query {
 bool pl_query_fail_steps(const pl_query *query, uint64_t limit);
 
 /* A candidate. Where it is: path writes its union terms from the root; or trail the accelerator's own way to it, from
- * which pl_accel.items gives the items on its path. */
+ * which pl_accel.items gives the items on its path, or pl_accel.path the path. */
 typedef struct pl_leaf {
     uint32_t shape; /* unused when mesh is set */
     const double *arguments;
@@ -99,6 +99,8 @@ struct pl_accel {
     bool (*trace_packet)(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
     /* The items from the scene's to the leaf's at a trail; NULL: its hits have paths. false: no memory. */
     bool (*items)(const pl_scene *scene, const pl_path *trail, pl_items *items);
+    /* Where trails lead to no items: the path in union terms at one. false: no memory. */
+    bool (*path)(const pl_scene *scene, const pl_path *trail, pl_path *path);
     /* Finds a hit's primitive index where tracing leaves it open; NULL: it doesn't. false: an error. */
     bool (*number)(pl_tracer *tracer, pl_hit *hit, pl_error *error);
 };

@@ -27,7 +27,9 @@ bool pl_items_path(const pl_items *items, pl_path *path)
 
 static bool trail_path(const pl_query *query, const pl_path *trail, pl_path *path)
 {
-    return query->tracer->scene->accel->items(query->tracer->scene, trail, &query->tracer->items) &&
+    const pl_accel *accel = query->tracer->scene->accel;
+    if (accel->path) return accel->path(query->tracer->scene, trail, path);
+    return accel->items(query->tracer->scene, trail, &query->tracer->items) &&
            pl_items_path(&query->tracer->items, path);
 }
 

@@ -9,11 +9,20 @@
 
 /* --- hits --- */
 
-/* A triangle's place: its number tells the terms. */
+/* A trail: the number of a terrain or, after these, of a single shape; and a triangle's. */
 typedef struct source {
-    const pl_terrain *terrain;
-    uint64_t leaf;
+    uint32_t place, leaf;
 } source;
+
+static bool write_trail(const void *context, pl_path *trail)
+{
+    const source *s = context;
+    if (trail->capacity < 2 && !pl_path_push(trail, 1, 0)) return false;
+    trail->terms[0] = s->place;
+    trail->terms[1] = s->leaf;
+    trail->length = 2;
+    return true;
+}
 
 static bool write_terms(const pl_terrain_place *place, uint32_t more, pl_path *path)
 {
@@ -24,13 +33,16 @@ static bool write_terms(const pl_terrain_place *place, uint32_t more, pl_path *p
     return true;
 }
 
-static bool triangle_path(const void *context, pl_path *path)
+/* A triangle's number tells the terms. */
+static bool trail_path(const pl_scene *scene, const pl_path *trail, pl_path *path)
 {
-    const source *s = context;
-    const pl_terrain *terrain = s->terrain;
+    const pl_terrains *terrains = scene->structure;
+    const uint32_t place = trail->terms[0];
+    if (place >= terrains->count) return write_terms(&terrains->singles[place - terrains->count].place, 0, path);
+    const pl_terrain *terrain = &terrains->list[place];
     if (!write_terms(&terrain->place, terrain->levels, path)) return false;
     uint32_t *terms = path->terms + terrain->place.term_count;
-    uint32_t rest = (uint32_t)s->leaf;
+    uint32_t rest = trail->terms[1];
     for (uint32_t i = terrain->levels; i-- > 0;) {
         terms[i] = terrain->shift[i] ? rest & (terrain->radix[i] - 1) : rest % terrain->radix[i];
         rest = terrain->shift[i] ? rest >> terrain->shift[i] : rest / terrain->radix[i];
@@ -44,28 +56,25 @@ bool pl_terrain_candidate(pl_tracer *tracer, const pl_terrain *terrain, uint64_t
     static const double no_arguments[PL_SHAPE_ARGUMENTS];
     double cells[PL_TERRAIN_CELLS], mapped_o[3], mapped_d[3];
     pl_affine matrix;
-    pl_transform transform;
+    pl_transform transform; /* of which pl_map_ray reads the inverse; singular ones would have been no terrain */
     pl_terrain_cells(terrain, pl_terrain_tile_at(terrain, tile)->values, leaf, cells);
     pl_terrain_matrix(&terrain->form, cells, &matrix);
-    pl_transform_set(&transform, &matrix);
+    pl_affine_invert(&matrix, pl_affine_determinant(&matrix), &transform.to_object);
+    transform.form = pl_form_of(&transform.to_object);
     memcpy(mapped_o, o, sizeof mapped_o);
     memcpy(mapped_d, d, sizeof mapped_d);
     pl_map_ray(&transform, mapped_o, mapped_d);
-    source s = {terrain, tile * terrain->tile_leaves + leaf};
+    const pl_terrains *terrains = tracer->scene->structure;
+    source s = {(uint32_t)(terrain - terrains->list), (uint32_t)(tile * terrain->tile_leaves) + leaf};
     pl_leaf candidate = {.shape = PL_SHAPE_TRIANGLE,
                          .arguments = no_arguments,
                          .primitive = terrain->place.first + s.leaf,
-                         .path = triangle_path,
+                         .trail = write_trail,
                          .source = &s,
                          .o = mapped_o,
                          .d = mapped_d};
     tracer->counters.primitive_tests++;
     return pl_query_leaf(query, &candidate);
-}
-
-static bool single_path(const void *context, pl_path *path)
-{
-    return write_terms(context, 0, path);
 }
 
 static void map_to_place(const pl_terrain_place *place, const pl_ray *ray, double o[3], double d[3])
@@ -81,13 +90,14 @@ static bool trace_singles(pl_tracer *tracer, const pl_terrains *terrains, const 
     for (uint32_t i = 0; i < terrains->single_count && !query->done; i++) {
         const pl_terrain_single *single = &terrains->singles[i];
         if (query->shadow && single->place.no_shadow) continue;
+        source s = {terrains->count + i, 0};
         map_to_place(&single->place, ray, o, d);
         pl_leaf leaf = {.shape = single->shape,
                         .mesh = single->mesh,
                         .arguments = single->arguments,
                         .primitive = single->place.first,
-                        .path = single_path,
-                        .source = &single->place,
+                        .trail = write_trail,
+                        .source = &s,
                         .o = o,
                         .d = d};
         tracer->counters.primitive_tests++;
@@ -201,4 +211,5 @@ void pl_terrains_count(const pl_scene *scene, pl_statistics *counts)
 
 const pl_accel pl_accel_terrain = {
     .name = "bvh", .destroy = destroy, .work_create = work_create, .work_destroy = work_destroy, .trace = trace,
-    .is_packet = is_packet, .trace_packet = trace_packet};
+    .is_packet = is_packet, .trace_packet = trace_packet,
+    .path = trail_path};

@@ -33,13 +33,17 @@ enum {
     PL_KIND_TILE = 1 /* of references in a terrain's tree */
 };
 
-/* The triangles' transformation: number i of its matrix is cell plus[i] - cell minus[i]. */
+/* The triangles' transformation: number i of its matrix (pl_affine) is cell plus[i] - cell minus[i]. */
 typedef struct pl_terrain_form {
     uint32_t node;         /* transform_code */
     uint32_t slots, cells; /* the first `slots` cells are parameters, the others numbers */
     uint32_t slot[PL_TERRAIN_CELLS];
     double number[PL_TERRAIN_CELLS];
     uint8_t plus[12], minus[12];
+    pl_affine fixed;      /* the numbers of the matrix that no parameter goes into … */
+    uint8_t variable[12]; /* … and where the others stand */
+    uint32_t variables;
+    bool signed_zeros; /* some cells may be -0 */
 } pl_terrain_form;
 
 /* Planes are in the unit frame: q lies at lo + q * step, rows are those of pl_front_node. Corners are in their cluster's box,
@@ -103,20 +107,27 @@ static inline const pl_terrain_tile *pl_terrain_tile_at(const pl_terrain *terrai
     return (const pl_terrain_tile *)(terrain->memory + tile * terrain->stride);
 }
 
+static inline bool pl_is_negative_zero(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits == UINT64_C(1) << 63;
+}
+
 /* A triangle's matrix from its cells. It is the identity times what its operation says (expression.c): that changes nothing but
- * the sign of a zero, so only then it is multiplied. */
+ * the sign of a zero, so only then it is multiplied. A difference is -0 only if a cell is. */
 static inline void pl_terrain_matrix(const pl_terrain_form *form, const double *cells, pl_affine *matrix)
 {
-    uint64_t negative_zero = 0;
-    for (int i = 0; i < 12; i++) {
-        const double x = cells[form->plus[i]] - cells[form->minus[i]];
-        uint64_t bits;
-        memcpy(&bits, &x, sizeof bits);
-        negative_zero |= bits == UINT64_C(1) << 63;
-        matrix->m[4 * (i % 3) + i / 3] = x;
+    *matrix = form->fixed;
+    for (uint32_t k = 0; k < form->variables; k++) {
+        const uint32_t i = form->variable[k];
+        matrix->m[i] = cells[form->plus[i]] - cells[form->minus[i]];
     }
+    if (!form->signed_zeros) return;
     const pl_affine identity = pl_affine_identity();
-    if (negative_zero) *matrix = pl_affine_multiply(&identity, matrix);
+    bool found = false;
+    for (int i = 0; i < 12; i++) found = found || pl_is_negative_zero(matrix->m[i]);
+    if (found) *matrix = pl_affine_multiply(&identity, matrix);
 }
 
 /* The cells of a triangle of a tile. */

@@ -142,7 +142,7 @@ typedef struct filler {
     pl_terrain_walk walk;
     bounds bounds;
     bool set[ROOM];
-    bool same;
+    bool same, signed_zeros;
 } filler;
 
 static double length3(double x, double y, double z)
@@ -197,6 +197,7 @@ static bool take_leaf(void *context, uint64_t leaf, const double *cells, const p
         uint32_t class = t->classes[c * t->tile_row + in_tile];
         if (!f->set[class]) values[class] = cells[c];
         else if (exact_bits(values[class]) != exact_bits(cells[c])) f->same = false;
+        f->signed_zeros = f->signed_zeros || pl_is_negative_zero(cells[c]);
         f->set[class] = true;
     }
     bound_triangle(&f->bounds, transform);
@@ -212,6 +213,7 @@ typedef struct job {
     atomic_bool departs, differs; /* the derivation from the shape; a tile from the classes */
     pthread_mutex_t lock;
     bounds bounds;
+    bool signed_zeros;
 } job;
 
 static void *work(void *context)
@@ -222,6 +224,7 @@ static void *work(void *context)
     if (!ready) atomic_store(&j->departs, true);
     if (f) {
         f->terrain = j->terrain;
+        f->signed_zeros = false;
         f->bounds = (bounds){.box = pl_box_empty()};
     }
     while (ready && !atomic_load(&j->departs) && !atomic_load(&j->differs)) {
@@ -234,6 +237,7 @@ static void *work(void *context)
     if (ready) {
         pthread_mutex_lock(&j->lock);
         join_bounds(&j->bounds, &f->bounds);
+        j->signed_zeros = j->signed_zeros || f->signed_zeros;
         pthread_mutex_unlock(&j->lock);
     }
     if (f) pl_terrain_walk_end(&f->walk);
@@ -407,6 +411,13 @@ static void *allocate_tiles(size_t bytes)
     return memory;
 }
 
+/* found: among the parameters. */
+static void settle_zeros(pl_terrain_form *form, bool found)
+{
+    for (uint32_t c = form->slots; c < form->cells; c++) found = found || pl_is_negative_zero(form->number[c]);
+    form->signed_zeros = found;
+}
+
 bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit)
 {
     pl_terrain_walk w;
@@ -427,7 +438,10 @@ bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit)
         if (ok) fill(scene, &j);
         ok = ok && !atomic_load(&j.departs);
         done = ok && !atomic_load(&j.differs);
-        if (done) ok = set_frame(terrain, &j.bounds) && build_tree(terrain, scene->threads);
+        if (done) {
+            settle_zeros(&terrain->form, j.signed_zeros);
+            ok = set_frame(terrain, &j.bounds) && build_tree(terrain, scene->threads);
+        }
         samples = samples > terrain->tiles / MORE_SAMPLES ? terrain->tiles : samples * MORE_SAMPLES;
     }
     pl_terrain_walk_end(&w);

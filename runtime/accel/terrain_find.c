@@ -56,6 +56,18 @@ static void order_cells(pl_terrain_form *form)
     }
 }
 
+/* Sets what follows from the cells. */
+static void settle_form(pl_terrain_form *form)
+{
+    form->signed_zeros = true;
+    form->variables = 0;
+    for (uint8_t i = 0; i < 12; i++) {
+        const uint8_t plus = form->plus[i], minus = form->minus[i];
+        if (plus < form->slots || minus < form->slots) form->variable[form->variables++] = i;
+        else form->fixed.m[i] = form->number[plus] - form->number[minus];
+    }
+}
+
 /* Code that is one matrix operation of numbers, parameters and differences of two of them; else false. */
 static bool read_form(const pl_program *program, uint32_t node, pl_terrain_form *form)
 {
@@ -84,9 +96,13 @@ static bool read_form(const pl_program *program, uint32_t node, pl_terrain_form 
             break;
         case PL_OP_MATRIX:
             if (top != 12 || *at != PL_OP_END) return false;
-            memcpy(form->plus, plus, sizeof form->plus);
-            memcpy(form->minus, minus, sizeof form->minus);
+            /* POV-Ray's twelve numbers stand column by column. */
+            for (int i = 0; i < 12; i++) {
+                form->plus[4 * (i % 3) + i / 3] = plus[i];
+                form->minus[4 * (i % 3) + i / 3] = minus[i];
+            }
             order_cells(form);
+            settle_form(form);
             return true;
         default: return false;
         }
