@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from test_fronts import answers, assert_same, available
+from test_packets import bundles
 from plsys.compiler import compile
 from plsys.runtime import Scene
 
@@ -94,6 +95,24 @@ def test_the_hits_are_those_of_the_derivation(name):
     for isa in available(data):
         for threads in (1, 3):
             assert_same(answers(data, origins, directions, isa=isa, threads=threads), expected, (isa, threads))
+
+
+@pytest.mark.parametrize("name", texts())
+def test_rays_that_go_together_do_not_show(name):
+    data = compile(texts()[name], parameters={"level": 4} if name in ("terrain", "flat") else {})
+    assert tiles(data) >= 8
+    origins, directions = bundles(data, 7)
+    # Among those that go together some that don't, in packets that aren't full.
+    origins, directions = np.insert(origins, 100, origins[500:505], 0), np.insert(directions, 100, directions[500:505], 0)
+    expected = answers(data, origins, directions, accelerator="boxes")
+    assert np.isfinite(expected["t"]).mean() > 0.2
+    steps = {}
+    for isa in available(data):
+        assert_same(answers(data, origins, directions, isa=isa), expected, isa)
+        with Scene(data, isa=isa) as scene:
+            scene.intersect(origins, directions)
+            steps[isa] = scene.statistics["box_tests"]
+    assert all(steps[isa] < 0.6 * steps["scalar"] for isa in steps if isa != "scalar")
 
 
 @pytest.mark.parametrize("name", ["terrain", "thirds"])
