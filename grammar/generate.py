@@ -80,6 +80,8 @@ def python_rows(table: dict) -> str:
         "",
         f"UNSUPPORTED_DIRECTIVES: dict[str, str] = {literal(table['unsupported_directives'])}",
         "",
+        f"SYNONYMS: dict[str, str] = {literal(table['synonyms'])}",
+        "",
         f"STOCK_INCLUDES: dict[str, object] = {literal(table['stock_includes'])}",
         "",
     ))  # fmt: skip

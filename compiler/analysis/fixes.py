@@ -15,6 +15,7 @@ from typing import Callable, Iterator
 from ..reading.codes import CODES
 from .actions import Action, Spot, TextEdit
 from .document import Document, Message
+from .fixes_arguments import ARGUMENT_FIXES
 from .fixes_scene import SCENE_FIXES
 from .fixes_text import HINT_FIXES, TEXT_FIXES, short
 from .scene import Scene
@@ -31,7 +32,8 @@ Found = tuple[str, list[TextEdit]] | None
 Fix = Callable[[Spot, re.Match, Message], Found]
 
 FIXES: dict[str, tuple[tuple[str, Fix], ...]] = {
-    code: (*TEXT_FIXES.get(code, ()), *SCENE_FIXES.get(code, ())) for code in {**TEXT_FIXES, **SCENE_FIXES}
+    code: (*TEXT_FIXES.get(code, ()), *SCENE_FIXES.get(code, ()), *ARGUMENT_FIXES.get(code, ()))
+    for code in {**TEXT_FIXES, **SCENE_FIXES, **ARGUMENT_FIXES}
 }
 BY_HINT = HINT_FIXES  # the first, the nearest name, comes before what a code has
 

@@ -9,7 +9,7 @@ import re
 from math import pi
 
 from ..reading import syntax, vocabulary
-from .actions import Spot, TextEdit, fresh_name
+from .actions import Spot, TextEdit, fresh_name, terms
 from .bounding import bounded
 from .document import Message
 
@@ -80,9 +80,11 @@ def _role(spot: Spot) -> tuple[str, ...] | None:
     """What an unknown name may be, by where it stands."""
     node, _ = spot.document.node_at(spot.start)
     parent = node.parent
+    is_call = False
     while parent is not None and parent.type == "call":
+        is_call = is_call or node == parent.children[0]
         node, parent = parent, parent.parent
-    if parent is None:
+    if parent is None or parent.type == "operation" and node == parent.children[0]:
         return None
     if parent.type == "term":
         is_operand = node.end_byte == parent.children[-1].end_byte
@@ -93,13 +95,35 @@ def _role(spot: Spot) -> tuple[str, ...] | None:
         return ("Selection",) if word == "object" else None
     return (
         ("value",)
-        if parent.type in ("binary", "unary", "operation", "assignment", "vector", "parenthesized")
+        if not is_call
+        and parent.type in ("binary", "unary", "operation", "assignment", "vector", "parenthesized")
         else None
     )
 
 
 def operand_sum(spot: Spot, match: re.Match, message: Message) -> Found:
+    if operand_last(spot, match, message) is not None:
+        return None
     return "Join with '+'", [spot.edit(spot.end, spot.end, " +")]
+
+
+def operand_last(spot: Spot, match: re.Match, message: Message) -> Found:
+    """Move an operand behind the operators that follow it."""
+    at = spot.start - spot.base
+    for term in terms(spot.definition):
+        if not any(item.span.start == at for item in term.items[:-1]):
+            continue
+        rest = term.items[[item.span.start for item in term.items].index(at) + 1 :]
+        if all(isinstance(item, syntax.Inline) or _is_operator_name(spot, item) for item in rest):
+            end = spot.base + rest[-1].span.end
+            operators = spot.slice(spot.base + rest[0].span.start, end)
+            return f"Write {spot.text} last", [spot.edit(spot.start, end, f"{operators} {spot.text}")]
+    return None
+
+
+def _is_operator_name(spot: Spot, item: object) -> bool:
+    entry = spot.scene.entries.get(item.name) if isinstance(item, syntax.Name) else None
+    return entry is not None and entry.kind in ("calculation", "transformation", "texture")
 
 
 def own_target(spot: Spot, match: re.Match, message: Message) -> Found:
@@ -292,6 +316,7 @@ SCENE_FIXES = {
         (r"of plsys$", rename_definition),
     ),
     "wrong-kind": (
+        (r"an operand: nothing can follow it", operand_last),
         (r"an operand: nothing can follow it|a group in brackets is an operand", operand_sum),
         (r"stands in the Selection '(\w+)'", own_target),
     ),

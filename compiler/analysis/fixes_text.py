@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import re
 
-from .actions import Spot, TextEdit
+from ..reading import syntax, vocabulary
+from .actions import Spot, TextEdit, rules
 from .document import Message
 
 Found = tuple[str, list[TextEdit]] | None
@@ -62,6 +63,8 @@ def in_brackets(spot: Spot, match: re.Match, message: Message) -> Found:
 def close(spot: Spot, match: re.Match, message: Message) -> Found:
     """Put the closer of a bracket where what it holds ends."""
     opener = spot.text
+    if close_inline(spot, match, message) is not None:
+        return None
     node, base = spot.document.node_at(spot.start)
     if opener == "{":
         block = spot.document.text.block_at(spot.start)[0]
@@ -138,6 +141,41 @@ def separate(mark: str):
     return fix
 
 
+def weigh_all(spot: Spot, match: re.Match, message: Message) -> Found:
+    """Give the alternatives of the rule that have none the weight 1."""
+    node, at = spot.definition, spot.start - spot.base
+    for production in node.productions if isinstance(node, syntax.Selection) else ():
+        for rule, _ in rules(production):
+            bodies = [each.body for each in rule.alternatives if each.weight is None and each.body is not None]
+            if any(body.span.start == at for body in bodies):
+                starts = [spot.base + body.span.start for body in bodies]
+                title = "Add '1:' to each alternative" if len(bodies) > 1 else "Add '1:'"
+                return title, [spot.edit(start, start, "1: ") for start in starts]
+    return None
+
+
+def close_inline(spot: Spot, match: re.Match, message: Message) -> Found:
+    """Put the ']' of an operator before the operand that it has swallowed."""
+    rest = spot.slice(spot.end, spot.base + len(spot.document.text.block_at(spot.start)[0].data))
+    found = re.match(r"([^\]\[{}|+]*?[\w.)])\s+([A-Za-z_]\w*)\s*(?=[;+|]|$)", rest.partition("\n")[0])
+    if spot.text != "[" or found is None:
+        return None
+    entry = spot.scene.entries.get(found[2])
+    if found[2] not in vocabulary.PRIMITIVES and (entry is None or entry.kind != "selection"):
+        return None
+    end = spot.end + len(found[1].encode())
+    return f"Add ']' before {found[2]}", [spot.edit(end, end, " ]")]
+
+
+def remove_directive(spot: Spot, match: re.Match, message: Message) -> Found:
+    """Take away a directive with the rest of its line."""
+    text = spot.document.text
+    end = text.line_start(text.line_of(spot.start)) + len(text.line_bytes(text.line_of(spot.start)))
+    line = re.match(r"[^;\r\n]*;?", spot.slice(spot.start, end))
+    assert line is not None
+    return f"Remove '{short(line[0].strip())}'", [spot.cut(spot.start, spot.start + len(line[0].encode()))]
+
+
 def add_body(spot: Spot, match: re.Match, message: Message) -> Found:
     body = re.search(r"\{.*\}$", message.diagnostic.hint)
     if body is None:
@@ -176,7 +214,7 @@ TEXT_FIXES = {
         (r"the number (\S+) touches the name (\w+)", touching_values),
         (r"operation's arguments stand without brackets", without_call_brackets),
         (r"a space stands between a function and its bracket", closed_up_call),
-        (r"this alternative has no weight", insert("1: ")),
+        (r"this alternative has no weight", weigh_all),
         (r"nothing stands after this '\+'|an alternative is missing after this", remove),
         (_WRITE, write_hint),
     ),
@@ -189,13 +227,17 @@ TEXT_FIXES = {
     ),
     "assignment-in-condition": ((r"", replace("==")),),
     "unclosed": (
+        (r"this '\[' is never closed", close_inline),
         (r"this '[{(\[<]' is never closed", close),
         (r"this string is never closed", close_string),
         (r"this comment is never closed", close_comment),
     ),
     "encoding": ((r"NUL byte|not UTF-8", remove),),
     "wrong-arguments": ((_WRITE, write_hint),),
-    "unsupported": ((r"^#local isn't", replace("#declare")),),
+    "unsupported": (
+        (r"^#local isn't", replace("#declare")),
+        (r"^#(?:version|undef|debug|warning|error|statistics|render) isn't", remove_directive),
+    ),
 }
 
 HINT_FIXES = (

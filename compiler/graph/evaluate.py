@@ -180,7 +180,7 @@ def transform(node: g.TransformCode, scope: Scope) -> Matrix:
     except ValueError as error:
         raise EvaluationError("degenerate", str(error), node.span) from None
     if not is_finite(matrix):
-        raise EvaluationError("not-finite", f"the matrix of '{node.name}' isn't finite", node.span)
+        raise EvaluationError("not-finite", f"the matrix of {repr(node.name) if node.name else 'these operations'} isn't finite", node.span)
     return matrix
 
 

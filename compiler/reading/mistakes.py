@@ -15,6 +15,7 @@ from .codes import CODES
 from .diagnostics import Diagnostic, Diagnostics, nearest
 from .grammar import language
 from .source import Source, Span
+from .vocabulary import UNSUPPORTED_DIRECTIVES
 
 if TYPE_CHECKING:
     from tree_sitter import Node, Query, Tree
@@ -178,7 +179,7 @@ def _directive(reading: Reading, node: Node, seen: bool) -> None:
         )
         return
     hint = nearest(f"#{word[1]}", [f"#{each}" for each in _DIRECTIVES])
-    hint = hint or _INSTEAD.get(word[1], "remove it; plsys has #declare and #include")
+    hint = hint or _INSTEAD.get(word[1]) or UNSUPPORTED_DIRECTIVES.get(word[1], "plsys has #declare and #include")
     reading.complain(span, f"#{word[1]} isn't supported", hint, "unsupported")
 
 

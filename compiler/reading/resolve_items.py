@@ -43,8 +43,9 @@ class Items:
     def __bool__(self) -> bool:
         return self.at < len(self.items)
 
-    def peek(self) -> syntax.Item | None:
-        return self.items[self.at] if self else None
+    def peek(self, ahead: int = 0) -> syntax.Item | None:
+        at = self.at + ahead
+        return self.items[at] if at < len(self.items) else None
 
     def take(self) -> syntax.Item:
         item = self.items[self.at]
@@ -72,11 +73,31 @@ class Items:
 
     def value(self, needed: str) -> Value:
         item = self.peek()
-        if item is None or isinstance(item, syntax.Block | syntax.MapEntry):
+        if item is None or isinstance(item, syntax.Block | syntax.MapEntry) or self._begins_property(item):
             span = item.span if item is not None else Span(self.span.source, self.span.end, self.span.end)
             what = f"a value for {needed}" if needed.startswith("'") else needed
-            raise Problem("wrong-arguments", span, f"{self.what} needs {what} here")
+            raise Problem("wrong-arguments", span, f"{self.what} needs {what} here", self._form(needed))
         return self.expressions.value(self.take(), self.scope)  # type: ignore[arg-type]
+
+    def _has_value(self) -> bool:
+        item = self.peek()
+        return item is not None and not isinstance(item, syntax.Block | syntax.MapEntry) and not self._begins_property(item)
+
+    def _begins_property(self, item: syntax.Item) -> bool:
+        """Whether the word that comes next is no value but begins what follows the values."""
+        name = self.plain_word()
+        return name not in self.expressions.names.entries and (
+            name in vocabulary.MODIFIERS or bool(self.home_of(name))
+        )
+
+    def _form(self, needed: str) -> str:
+        """A hint that shows the form of the modifier that is needed, or of the block."""
+        if needed.strip("'") in vocabulary.MODIFIERS:
+            return f"it looks like {vocabulary.MODIFIERS[needed.strip(chr(39))].signature}"
+        if needed.startswith("'"):
+            return ""
+        row = vocabulary.BLOCKS.get(self.what.strip("'"))
+        return f"it looks like {row.signature}" if row is not None and (row.types or row.name == "light_source") else ""
 
     def number(self, needed: str = "a number") -> Expression:
         value = self.value(needed)
@@ -134,7 +155,10 @@ class Items:
             parts = self._plain(needed)
         while self.plain_word() in WORD_PARTS:
             word = self.plain_word()
-            self.take()
+            name = self.take()
+            if word.capitalize() in vocabulary.COLOURS and not self._has_value():
+                mend = word.capitalize()
+                raise Problem("unknown-name", name.span, f"unknown name '{word}': a colour is needed here", f"did you mean '{mend}'?", mend=mend)
             parts[WORD_PARTS[word]] = self.number(f"'{word}'")
         first = self.items[begin] if item is not None else self
         span = first.span.to(self.items[self.at - 1].span)
@@ -179,6 +203,7 @@ class Items:
 
     def misfit(self, rows: Sequence[str]) -> Problem:
         """What to say of the next item, which the block has no use for; moves past it."""
+        begin = self.at
         item = self.take()
         name = item.name if isinstance(item, syntax.Block | syntax.Call) else item
         if not isinstance(name, syntax.Name):
@@ -197,6 +222,9 @@ class Items:
         if name.name in rows:
             return Problem("missing", name.span, f"'{name.name}' needs a block", f"write {name.name} {{ … }}")
         message = f"{self.what} has no '{name.name}'"
+        if (mend := self._at_home(begin, rows)) is not None:
+            span = name.span.to(self.items[self.at - 1].span)
+            return Problem("unknown-name", span, message, f"write {mend}", mend=mend)
         hint = nearest(name.name, rows)
         if not hint and rows:
             hint = f"it has: {' '.join(rows)}"
@@ -206,6 +234,26 @@ class Items:
             else "unknown-name"
         )
         return Problem(code, name.span, message, hint)
+
+
+    def home_of(self, name: str) -> str:
+        """The block that has the property or the colour ``name``, of those that objects and textures hold."""
+        if name in vocabulary.COLOUR_WORDS:
+            return "pigment"
+        return next((block for block in ("finish", "pigment") if name in vocabulary.PROPERTIES[block]), "")
+
+    def _at_home(self, begin: int, rows: Sequence[str]) -> str | None:
+        """What has been taken from the item ``begin`` on, in the block where it belongs; None if that isn't in ``rows``."""
+        first = self.items[begin]
+        home = self.home_of(first.name) if isinstance(first, syntax.Name) else ""
+        if home not in rows or not home or first.name in self.expressions.names.entries:
+            return None
+        while self.plain_word() in vocabulary.COLOURS or self.plain_word() in (*RGB_PARTS, *WORD_PARTS):
+            self.take()
+            self.skip_value()
+        if self.at - begin < 2:
+            return None
+        return f"{home} {{ {first.span.to(self.items[self.at - 1].span).text} }}"
 
 
 def _spread(item: syntax.Item, expressions: Expressions) -> list[syntax.Item]:

@@ -221,9 +221,10 @@ class Names:
             what = f"{ARTICLES[taken]} of plsys" if taken else ARTICLES[entry.kind]
             notes = () if taken else (Note(entry.definition.span, f"'{name.name}' is defined here"),)
             message = f"'{name.name}' is {what} and can't be assigned"
-            self.diagnostics.add(
-                "wrong-kind", name.span, message, "choose another name for the parameter", notes
-            )
+            hint = "choose another name for the parameter"
+            if entry is not None and entry.kind in ("value", "input"):
+                hint = f"to count with it, assign it to a parameter first: k = {name.name}"
+            self.diagnostics.add("wrong-kind", name.span, message, hint, notes)
             return
         definition = Definition(name.name, "parameter", name.span, assignments=[name.span])
         self.entries[name.name] = Entry(definition, name)
@@ -265,7 +266,10 @@ class Names:
             return Problem("wrong-kind", name.span, message, hint)
         if name.name in vocabulary.UNSUPPORTED:
             return unsupported(name)
-        hint = self.nearest(name.name, kinds) or self.nearest(name.name, None)
+        if (truth := _TRUTHS.get(name.name.lower())) is not None and "constant" in kinds:
+            message = f"plsys has no '{name.name}'"
+            return Problem("unknown-name", name.span, message, f"write {truth}: 0 is false, the rest is true", mend=truth)
+        hint = synonym(name.name, kinds) or self.nearest(name.name, kinds) or self.nearest(name.name, None)
         return Problem(
             "unknown-name", name.span, f"unknown name '{name.name}': {wanted} is needed here", hint
         )
@@ -286,6 +290,12 @@ def vocabulary_names(kind: str) -> Iterable[str]:
         "constant": vocabulary.CONSTANTS,
         "colour": vocabulary.COLOURS,
     }.get(kind, ())
+
+
+def synonym(name: str, kinds: tuple[str, ...]) -> str:
+    """A hint that names what plsys calls it, where another program's name stands."""
+    ours = vocabulary.SYNONYMS.get(name.lower(), "")
+    return f"did you mean '{ours}'?" if ours and vocabulary.kind_of(ours) in kinds else ""
 
 
 _TRUTHS = {"true": "1", "yes": "1", "on": "1", "false": "0", "no": "0", "off": "0"}

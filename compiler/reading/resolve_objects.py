@@ -185,11 +185,19 @@ class Objects:
                 items.at -= 1
                 raise items.misfit(OBJECT_BLOCKS)
             parts.append(self.object(block))
+        self._no_bare_symbol(items)
         if not parts:
             raise Problem(
                 "wrong-arguments", items.span, "this union is empty", "write objects into it: sphere { … }"
             )
         return Placed(parts[0] if len(parts) == 1 else Sum(tuple(parts), items.span), compound=True)
+
+    def _no_bare_symbol(self, items: Items) -> None:
+        """Raises Problem for the name of a Selection or a declared object where a union's object is awaited."""
+        item, entry = items.peek(), self.names.entries.get(items.word())
+        if entry is not None and entry.kind in ("selection", "object") and not isinstance(item, syntax.Block):
+            mend = f"object {{ {item.span.text} }}"
+            raise Problem("wrong-kind", item.span, "a union joins blocks", f"write {mend}", mend=mend)
 
     def _mesh(self, items: Items) -> Operand:
         triangles = []

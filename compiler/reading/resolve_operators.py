@@ -10,7 +10,7 @@ from . import syntax, vocabulary
 from .diagnostics import nearest
 from .model import Apply, Assign, Calculate, Constant, Expression, Operator, Read, Step, Transform, Variants
 from .resolve_expressions import RULES, Expressions
-from .resolve_names import ARTICLES, Entry, Names, Problem
+from .resolve_names import ARTICLES, Entry, Names, Problem, synonym
 
 UPDATES = {"+=": "add", "-=": "subtract", "*=": "multiply", "/=": "divide", "++": "add", "--": "subtract"}
 
@@ -146,14 +146,18 @@ class Operators:
                 hint = f"what {name.name} produces is joined by '+': {name.name} + …"
             return Problem("wrong-kind", name.span, message, hint)
         problem = self.names.unknown(name, (), "an operation")
-        problem.hint = problem.hint or nearest(name.name, vocabulary.OPERATIONS)
-        problem.hint = problem.hint or f"operations are {' '.join(vocabulary.OPERATIONS)}"
+        ours = synonym(name.name, ("operation",)) or nearest(name.name, vocabulary.OPERATIONS)
+        problem.hint = ours or problem.hint or f"operations are {' '.join(vocabulary.OPERATIONS)}"
         return problem
 
 
 def _from_povray(node: syntax.Operation) -> str | None:
     """POV-Ray's ``translate`` or ``rotate`` of one vector in our operations; None for other arguments. POV-Ray turns about
     x first; here the last operation acts first."""
+    if node.name.name == "translate" and len(node.arguments) == 3:  # numbers side by side
+        return node.span.text.replace("translate", "trans", 1)
+    if node.name.name == "rotate" and len(node.arguments) == 4:
+        return node.span.text.replace("rotate", "rot", 1)
     if len(node.arguments) != 1 or node.name.name not in ("translate", "rotate"):
         return None
     (argument,) = node.arguments

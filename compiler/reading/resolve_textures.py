@@ -272,6 +272,8 @@ class Textures:
             or items.at > 0
             or item.name in MODIFIERS
             or vocabulary.kind_of(item.name)
+            or items.home_of(item.name)
+            or isinstance(items.peek(1), syntax.Number | syntax.Vector)
         ):
             return items.misfit(rows)
         try:

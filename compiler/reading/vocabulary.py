@@ -16,9 +16,9 @@ import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from .vocabulary_rows import COLOURS, ROWS, STOCK_INCLUDES, UNSUPPORTED, UNSUPPORTED_DIRECTIVES
+from .vocabulary_rows import COLOURS, ROWS, STOCK_INCLUDES, SYNONYMS, UNSUPPORTED, UNSUPPORTED_DIRECTIVES
 
-__all__ = ["COLOURS", "STOCK_INCLUDES", "UNSUPPORTED", "UNSUPPORTED_DIRECTIVES"]
+__all__ = ["COLOURS", "STOCK_INCLUDES", "SYNONYMS", "UNSUPPORTED", "UNSUPPORTED_DIRECTIVES"]
 
 
 class Interval(NamedTuple):

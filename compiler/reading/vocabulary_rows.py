@@ -1239,30 +1239,12 @@ UNSUPPORTED: dict[str, str] = {'difference': 'plsys has no solid geometry: only 
              'asin acos atan2 rand hash; `%` is the remainder',
  'array': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
           'acos atan2 rand hash; `%` is the remainder',
- 'degrees': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
-            'acos atan2 rand hash; `%` is the remainder',
- 'radians': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
-            'acos atan2 rand hash; `%` is the remainder',
- 'int': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
-        'acos atan2 rand hash; `%` is the remainder',
- 'mod': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
-        'acos atan2 rand hash; `%` is the remainder',
- 'div': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
-        'acos atan2 rand hash; `%` is the remainder',
- 'ln': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin acos '
-       'atan2 rand hash; `%` is the remainder',
- 'select': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
-           'acos atan2 rand hash; `%` is the remainder',
  'prod': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
          'acos atan2 rand hash; `%` is the remainder',
  'sum': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
         'acos atan2 rand hash; `%` is the remainder',
- 'sqr': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
-        'acos atan2 rand hash; `%` is the remainder',
  'inside': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
            'acos atan2 rand hash; `%` is the remainder',
- 'atan': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
-         'acos atan2 rand hash; `%` is the remainder',
  'sinh': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
          'acos atan2 rand hash; `%` is the remainder',
  'cosh': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
@@ -1282,7 +1264,16 @@ UNSUPPORTED: dict[str, str] = {'difference': 'plsys has no solid geometry: only 
  'bitwise_or': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan '
                'asin acos atan2 rand hash; `%` is the remainder',
  'bitwise_xor': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan '
-                'asin acos atan2 rand hash; `%` is the remainder'}
+                'asin acos atan2 rand hash; `%` is the remainder',
+ 'sqr': 'write x*x',
+ 'mod': 'write a % b',
+ 'ln': 'log is the natural logarithm: write log(x)',
+ 'int': 'write floor(x)',
+ 'div': 'write floor(a/b)',
+ 'atan': 'write atan2(x, 1), which is in degrees',
+ 'degrees': 'angles are degrees everywhere: leave it out',
+ 'radians': 'angles are degrees everywhere: leave it out',
+ 'select': 'write test ? a : b'}
 
 UNSUPPORTED_DIRECTIVES: dict[str, str] = {'local': 'use #declare: there is one level of names',
  'while': 'repetition is a Selection that refers to itself',
@@ -1310,6 +1301,40 @@ UNSUPPORTED_DIRECTIVES: dict[str, str] = {'local': 'use #declare: there is one l
  'fclose': 'scenes read and write no files but #include and mesh',
  'read': 'scenes read and write no files but #include and mesh',
  'write': 'scenes read and write no files but #include and mesh'}
+
+SYNONYMS: dict[str, str] = {'cube': 'box',
+ 'cuboid': 'box',
+ 'brick': 'box',
+ 'ball': 'sphere',
+ 'ellipsoid': 'sphere',
+ 'tube': 'cylinder',
+ 'pipe': 'cylinder',
+ 'rod': 'cylinder',
+ 'circle': 'disc',
+ 'rect': 'square',
+ 'rectangle': 'square',
+ 'quad': 'square',
+ 'donut': 'torus',
+ 'ring': 'torus',
+ 'random': 'rand',
+ 'rnd': 'rand',
+ 'power': 'pow',
+ 'lerp': 'mix',
+ 'trunc': 'floor',
+ 'arcsin': 'asin',
+ 'arccos': 'acos',
+ 'arctan2': 'atan2',
+ 'move': 'trans',
+ 'shift': 'trans',
+ 'translation': 'trans',
+ 'resize': 'scale',
+ 'rotatex': 'rotx',
+ 'rotatey': 'roty',
+ 'rotatez': 'rotz',
+ 'rotate_x': 'rotx',
+ 'rotate_y': 'roty',
+ 'rotate_z': 'rotz',
+ 'skew': 'shear'}
 
 STOCK_INCLUDES: dict[str, object] = {'colors': 'its colour names are built in: leave the line out',
  'default': 'plsys reads .plsys files; write what you need of it as #declare',
