@@ -159,10 +159,11 @@ static bool finish_cut(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, 
     return take_first_texture(tracer, hit->t, surface, error);
 }
 
-/* By the path: the derivation once more. */
-static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, const pl_path *path,
+/* By the path: the derivation once more, or as much of it as the accelerator can't skip. */
+static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, const pl_path *path, bool skips,
                          pl_surface *surface, pl_error *error)
 {
+    const pl_accel *accel = tracer->scene->accel;
     pl_walk *walk = &tracer->walk;
     double *o = walk->at.payload, *d = o + 3;
     pl_walk_restart(walk, 0, NULL);
@@ -185,6 +186,7 @@ static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit
         case PL_EVENT_ENTER:
             if (hit->cut_depth && walk->at.terms == path->length && walk->at.depth + 1 == hit->cut_depth)
                 return finish_cut(tracer, ray, hit, surface, error);
+            if (skips) accel->skip(tracer->scene, &hit->trail, walk);
             break;
         case PL_EVENT_PRIMITIVE:
             leaf.shape = pl_shape_of(walk->shape);
@@ -264,8 +266,13 @@ bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, p
 {
     const pl_accel *accel = tracer->scene->accel;
     bool code;
-    if (accel->path && !accel->path(tracer->scene, &hit->trail, &tracer->scratch)) return pl_fail_memory(error, "shading a hit");
-    if (!accel->items) return walk_surface(tracer, ray, hit, accel->path ? &tracer->scratch : &hit->path, surface, error);
+    if (accel->path) {
+        pl_error ignored;
+        if (!accel->path(tracer->scene, &hit->trail, &tracer->scratch)) return pl_fail_memory(error, "shading a hit");
+        return (accel->skip && walk_surface(tracer, ray, hit, &tracer->scratch, true, surface, &ignored)) ||
+               walk_surface(tracer, ray, hit, &tracer->scratch, false, surface, error);
+    }
+    if (!accel->items) return walk_surface(tracer, ray, hit, &hit->path, false, surface, error);
     if (!accel->items(tracer->scene, &hit->trail, &tracer->items)) return pl_fail_memory(error, "shading a hit");
     int64_t textured = innermost_texture(&tracer->items, &code);
     if (!code && !hit->cut_depth) {
@@ -273,5 +280,5 @@ bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, p
         return true;
     }
     if (!pl_items_path(&tracer->items, &tracer->scratch)) return pl_fail_memory(error, "shading a hit");
-    return walk_surface(tracer, ray, hit, &tracer->scratch, surface, error);
+    return walk_surface(tracer, ray, hit, &tracer->scratch, false, surface, error);
 }

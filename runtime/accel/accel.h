@@ -101,6 +101,9 @@ struct pl_accel {
     bool (*items)(const pl_scene *scene, const pl_path *trail, pl_items *items);
     /* Where trails lead to no items: the path in union terms at one. false: no memory. */
     bool (*path)(const pl_scene *scene, const pl_path *trail, pl_path *path);
+    /* A walk that follows such a path to its leaf stands at an enter node: it may be moved to a later one. What isn't known
+     * there has no value, so that whoever reads it gets an error and walks the whole path. NULL: it never is. */
+    void (*skip)(const pl_scene *scene, const pl_path *trail, pl_walk *walk);
     /* Finds a hit's primitive index where tracing leaves it open; NULL: it doesn't. false: an error. */
     bool (*number)(pl_tracer *tracer, pl_hit *hit, pl_error *error);
 };

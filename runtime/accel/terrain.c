@@ -50,6 +50,12 @@ static bool trail_path(const pl_scene *scene, const pl_path *trail, pl_path *pat
     return true;
 }
 
+static void skip(const pl_scene *scene, const pl_path *trail, pl_walk *walk)
+{
+    const pl_terrains *terrains = scene->structure;
+    if (trail->terms[0] < terrains->count) pl_terrain_end_skip(&terrains->list[trail->terms[0]], trail->terms[1], walk);
+}
+
 bool pl_terrain_candidate(pl_tracer *tracer, const pl_terrain *terrain, uint64_t tile, uint32_t leaf, const double o[3],
                           const double d[3], pl_query *query)
 {
@@ -179,6 +185,8 @@ void pl_terrains_free(pl_terrains *terrains)
         free_place(&terrain->place);
         free(terrain->scope);
         free(terrain->classes);
+        free(terrain->end.cells);
+        free(terrain->end.values);
         free(terrain->memory);
         free((void *)terrain->front.nodes);
     }
@@ -212,4 +220,4 @@ void pl_terrains_count(const pl_scene *scene, pl_statistics *counts)
 const pl_accel pl_accel_terrain = {
     .name = "bvh", .destroy = destroy, .work_create = work_create, .work_destroy = work_destroy, .trace = trace,
     .is_packet = is_packet, .trace_packet = trace_packet,
-    .path = trail_path};
+    .path = trail_path, .skip = skip};

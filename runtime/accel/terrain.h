@@ -13,6 +13,7 @@
  * were filled. So hits are normative and nothing is derived while tracing.
  *
  *     terrain_find.c  scene -> terrains, or none      terrain_fill.c  terrain -> tiles      terrain.c  rays -> hits
+ *     terrain_end.c  what is known of a triangle's last symbol
  *     terrain_kernel.h  the traversal, for an instruction set each      terrain_packet.h  the same of many rays
  *
  * Example: 2,097,152 triangles with heights of their own and shared edges take 18.8 bytes each, tree included. */
@@ -65,6 +66,16 @@ typedef struct pl_terrain_place {
     uint64_t first; /* the number of its first primitive */
 } pl_terrain_place;
 
+/* The last symbol on the way to each triangle, and what parameters have on the way into it: as far as that is known without
+ * deriving what stands above, shading a triangle needn't. */
+typedef struct pl_terrain_end {
+    bool known;
+    uint32_t symbol;
+    int32_t rule;    /* of the reference to it */
+    uint8_t *cells;  /* by slot: the cell with the parameter's value, or PL_TERRAIN_CELLS … */
+    double *values;  /* … if it has this one always; NaN: none, or not known */
+} pl_terrain_end;
+
 typedef struct pl_terrain {
     pl_terrain_place place;
     uint32_t symbol;
@@ -81,6 +92,7 @@ typedef struct pl_terrain {
     uint32_t tile_row;   /* tile_leaves, filled up to whole clusters */
     uint32_t values;     /* of a tile */
     size_t stride;       /* bytes of a tile */
+    pl_terrain_end end;
     unsigned char *memory;
     pl_front front;      /* its tree's leaves are tiles */
     size_t node_bytes;
@@ -140,11 +152,15 @@ static inline void pl_terrain_cells(const pl_terrain *terrain, const double *val
 
 /* --- terrain_find.c --- */
 
-/* A thread's working memory to derive parts of a terrain. */
+/* A thread's working memory to derive parts of a terrain, and what it saw last. */
 typedef struct pl_terrain_walk {
     pl_walk walk;
     pl_scope scope;
     pl_path path;
+    double *entering;    /* the parameters at the last enter node */
+    uint32_t symbol, terms;
+    int32_t rule;
+    bool textured;       /* ever, above a last symbol */
 } pl_terrain_walk;
 bool pl_terrain_walk_begin(pl_terrain_walk *w, const pl_program *program);
 void pl_terrain_walk_end(pl_terrain_walk *w);
@@ -157,6 +173,31 @@ bool pl_terrain_derive(const pl_terrain *terrain, pl_terrain_walk *w, uint32_t l
 
 /* Whether the scene is terrains and a few single shapes, which pay; then it has scene->structure. */
 bool pl_terrains_build(pl_scene *scene);
+
+/* --- terrain_end.c --- */
+
+/* What triangles have had in common so far: slots by slot a bit for each cell that has the value, and one above for that
+ * being `values`. */
+typedef struct pl_terrain_common {
+    uint32_t count; /* of parameters */
+    bool any, same;
+    uint32_t symbol;
+    int32_t rule;
+    uint32_t *agree;
+    double *values;
+} pl_terrain_common;
+bool pl_terrain_common_begin(pl_terrain_common *common, uint32_t parameters);
+void pl_terrain_common_free(pl_terrain_common *common);
+
+/* Adds the triangle whose primitive the walk stands at. */
+void pl_terrain_common_add(pl_terrain_common *common, const pl_terrain *terrain, const pl_terrain_walk *w, const double *cells);
+void pl_terrain_common_join(pl_terrain_common *common, const pl_terrain_common *other);
+
+/* Sets terrain->end. false: no memory. */
+bool pl_terrain_end_set(pl_terrain *terrain, const pl_terrain_common *common);
+
+/* Moves a walk from the terrain's symbol to the last one above a triangle (pl_accel.skip). */
+void pl_terrain_end_skip(const pl_terrain *terrain, uint32_t leaf, pl_walk *walk);
 
 /* --- terrain_fill.c --- */
 

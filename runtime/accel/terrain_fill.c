@@ -141,6 +141,7 @@ typedef struct filler {
     pl_terrain *terrain;
     pl_terrain_walk walk;
     bounds bounds;
+    pl_terrain_common common;
     bool set[ROOM];
     bool same, signed_zeros;
 } filler;
@@ -201,6 +202,7 @@ static bool take_leaf(void *context, uint64_t leaf, const double *cells, const p
         f->set[class] = true;
     }
     bound_triangle(&f->bounds, transform);
+    pl_terrain_common_add(&f->common, t, &f->walk, cells);
     return f->same;
 }
 
@@ -213,6 +215,7 @@ typedef struct job {
     atomic_bool departs, differs; /* the derivation from the shape; a tile from the classes */
     pthread_mutex_t lock;
     bounds bounds;
+    pl_terrain_common common;
     bool signed_zeros;
 } job;
 
@@ -220,7 +223,8 @@ static void *work(void *context)
 {
     job *j = context;
     filler *f = malloc(sizeof *f);
-    bool ready = f && pl_terrain_walk_begin(&f->walk, j->program);
+    const bool begun = f && pl_terrain_walk_begin(&f->walk, j->program);
+    const bool ready = f && pl_terrain_common_begin(&f->common, j->program->parameter_count) && begun;
     if (!ready) atomic_store(&j->departs, true);
     if (f) {
         f->terrain = j->terrain;
@@ -238,9 +242,13 @@ static void *work(void *context)
         pthread_mutex_lock(&j->lock);
         join_bounds(&j->bounds, &f->bounds);
         j->signed_zeros = j->signed_zeros || f->signed_zeros;
+        pl_terrain_common_join(&j->common, &f->common);
         pthread_mutex_unlock(&j->lock);
     }
-    if (f) pl_terrain_walk_end(&f->walk);
+    if (f) {
+        pl_terrain_walk_end(&f->walk);
+        pl_terrain_common_free(&f->common);
+    }
     free(f);
     return NULL;
 }
@@ -418,6 +426,23 @@ static void settle_zeros(pl_terrain_form *form, bool found)
     form->signed_zeros = found;
 }
 
+/* What follows from all triangles together. */
+static bool finish(const pl_scene *scene, pl_terrain *terrain, const job *j)
+{
+    settle_zeros(&terrain->form, j->signed_zeros);
+    return set_frame(terrain, &j->bounds) && pl_terrain_end_set(terrain, &j->common) && build_tree(terrain, scene->threads);
+}
+
+/* Room for the tiles, and in the limit for the tree: its boxes while it is built, and nodes that have five children or more. */
+static bool make_room(pl_terrain *terrain, size_t limit)
+{
+    const size_t a_tile = terrain->stride + sizeof(pl_boxed) + 2 * sizeof(pl_front_node) / 4;
+    free(terrain->memory);
+    terrain->memory = NULL;
+    return terrain->tiles <= PL_REF_INDEX / PL_TERRAIN_CLUSTERS && terrain->tiles <= limit / a_tile &&
+           (terrain->memory = allocate_tiles(terrain->tiles * terrain->stride));
+}
+
 bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit)
 {
     pl_terrain_walk w;
@@ -426,22 +451,14 @@ bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit)
     terrain->classes = calloc(terrain->form.slots * terrain->tile_row, sizeof *terrain->classes);
     ok = ok && terrain->classes;
     while (ok && !done) {
-        ok = learn(terrain, &w, samples);
-        /* The tree: its boxes while it is built, and nodes that have five children or more. */
-        size_t a_tile = terrain->stride + sizeof(pl_boxed) + 2 * sizeof(pl_front_node) / 4;
-        free(terrain->memory);
-        terrain->memory = NULL;
-        if (!ok || terrain->tiles > PL_REF_INDEX / PL_TERRAIN_CLUSTERS || terrain->tiles > limit / a_tile ||
-            !(terrain->memory = allocate_tiles(terrain->tiles * terrain->stride)))
-            ok = false;
         job j = {.terrain = terrain};
+        ok = pl_terrain_common_begin(&j.common, scene->program->parameter_count) && learn(terrain, &w, samples) &&
+             make_room(terrain, limit);
         if (ok) fill(scene, &j);
         ok = ok && !atomic_load(&j.departs);
         done = ok && !atomic_load(&j.differs);
-        if (done) {
-            settle_zeros(&terrain->form, j.signed_zeros);
-            ok = set_frame(terrain, &j.bounds) && build_tree(terrain, scene->threads);
-        }
+        if (done) ok = finish(scene, terrain, &j);
+        pl_terrain_common_free(&j.common);
         samples = samples > terrain->tiles / MORE_SAMPLES ? terrain->tiles : samples * MORE_SAMPLES;
     }
     pl_terrain_walk_end(&w);

@@ -124,13 +124,15 @@ bool pl_terrain_walk_begin(pl_terrain_walk *w, const pl_program *program)
 {
     memset(w, 0, sizeof *w);
     w->scope.parameters = malloc((program->parameter_count + 1) * sizeof(double));
-    return w->scope.parameters && pl_walk_begin(&w->walk, program, 0, NULL, NULL);
+    w->entering = malloc((program->parameter_count + 1) * sizeof(double));
+    return w->scope.parameters && w->entering && pl_walk_begin(&w->walk, program, 0, NULL, NULL);
 }
 
 void pl_terrain_walk_end(pl_terrain_walk *w)
 {
     if (w->walk.program) pl_walk_end(&w->walk);
     free(w->scope.parameters);
+    free(w->entering);
     free(w->path.terms);
 }
 
@@ -161,8 +163,10 @@ static bool seek(const pl_terrain *terrain, pl_terrain_walk *w, uint32_t level, 
     if (!set_path(terrain, level, index, &w->path)) return false;
     walk->follow = &w->path;
     pl_event event;
-    do event = pl_walk_next(walk, NULL);
-    while (event == PL_EVENT_TEXTURE || (event == PL_EVENT_ENTER && walk->at.terms < level));
+    do {
+        event = pl_walk_next(walk, NULL);
+        w->textured = w->textured || event == PL_EVENT_TEXTURE;
+    } while (event == PL_EVENT_TEXTURE || (event == PL_EVENT_ENTER && walk->at.terms < level));
     walk->follow = NULL;
     if (event != PL_EVENT_ENTER) return false;
     *entered = walk->at.depth;
@@ -183,6 +187,15 @@ static bool read_cells(const pl_terrain_form *form, const pl_walk *walk, double 
     return memcmp(&matrix, &walk->transform->to_parent, sizeof matrix) == 0;
 }
 
+static void remember_entering(pl_terrain_walk *w)
+{
+    const pl_walk *walk = &w->walk;
+    w->symbol = walk->program->nodes[walk->node].as.enter.symbol;
+    w->terms = walk->at.terms;
+    w->rule = walk->at.rule;
+    memcpy(w->entering, walk->scope.parameters, walk->program->parameter_count * sizeof *w->entering);
+}
+
 /* A terrain of two levels counts 00, 01, 02, 03, 10, … */
 static void next_place(const pl_terrain *terrain, uint32_t level, uint32_t *digits)
 {
@@ -200,13 +213,16 @@ bool pl_terrain_derive(const pl_terrain *terrain, pl_terrain_walk *w, uint32_t l
     const uint64_t count = leaves_below(terrain, level), end = (index + 1) * count;
     const size_t digit_bytes = (terrain->levels - level) * sizeof *digits;
     double cells[PL_TERRAIN_CELLS];
-    bool placed = false;
+    bool placed = false, texture = false;
+    w->symbol = UINT32_MAX;
     if (!seek(terrain, w, level, index, &entered)) return false;
     for (uint64_t leaf = index * count; leaf < end;) {
         switch (pl_walk_next(walk, NULL)) {
-        case PL_EVENT_TEXTURE: break;
+        case PL_EVENT_TEXTURE: texture = true; break;
         case PL_EVENT_ENTER:
             if (placed) return false;
+            w->textured = w->textured || texture;
+            remember_entering(w);
             break;
         case PL_EVENT_TRANSFORM:
             if (placed || !read_cells(&terrain->form, walk, cells)) return false;
@@ -219,7 +235,7 @@ bool pl_terrain_derive(const pl_terrain *terrain, pl_terrain_walk *w, uint32_t l
                 !take(context, leaf++, cells, walk->transform))
                 return false;
             next_place(terrain, level, digits);
-            placed = false;
+            placed = texture = false;
             break;
         default: return false;
         }
@@ -358,7 +374,8 @@ static bool fill_all(const pl_scene *scene, pl_terrains *terrains)
         size_t taken = used + terrains->bytes;
         if (taken >= scene->memory || !pl_terrain_fill(scene, terrain, scene->memory - taken)) return false;
         terrains->bytes += terrain->tiles * terrain->stride + terrain->node_bytes +
-                           terrain->form.slots * terrain->tile_row * sizeof *terrain->classes;
+                           terrain->form.slots * terrain->tile_row * sizeof *terrain->classes +
+                           scene->program->parameter_count * (sizeof *terrain->end.cells + sizeof *terrain->end.values);
     }
     return true;
 }

@@ -125,6 +125,43 @@ def test_the_picture_is_the_same(name):
         assert scene.statistics["terrain"]["tiles"]
 
 
+# What a texture reads, and where it stands: as scene.plsys has it, parameters that aren't a corner's, draws, upper levels.
+GROUND = "Patch -> C_ground Ground T_corners triangle;"
+LOOKS = {
+    "what stays the same": {"height = (za + zb + zc) / 3;": "height = (za + zb + zc) / 3 + n + rough;"},
+    "a parameter from above": {"height = (za + zb + zc) / 3;": "height = zab + xbc + yca;"},
+    "a draw": {"height = (za + zb + zc) / 3;": "height = 9*rand(0);"},
+    "a draw of the texture's": {"ambient 0.12": "ambient rand(3)"},
+    "a texture above some": {"Patch -> C_middles (": "Patch -> C_middles Ground2 (", GROUND: "Patch -> C_ground T_corners triangle;",
+                             "Texture Ground\n": "Texture Ground2 { pigment { color rgb <n/4, rough/14, 0.5> } }\nTexture Ground\n"},
+    "the object's texture": {GROUND: "Patch -> T_corners triangle;",
+                             "object { Hills }": "object { Hills texture { pigment { checker color rgb 1 color rgb 0 } } rotate <0, 0, 20> }"},
+    "another symbol at the end": {GROUND: "Patch -> C_ground Ground [ n = za; ] End;",
+                                  "Calculation C_ground": "Selection End { End -> [ zc = zc; ] T_corners triangle; }\nCalculation C_ground"},
+    "a texture in some rules": {GROUND: "if (za > 0) Patch -> C_ground Ground End; else Patch -> End;",
+                                "Calculation C_ground": "Selection End { End -> T_corners triangle; }\nCalculation C_ground"},
+    "a pattern": {GROUND: "Patch -> C_ground Chequers T_corners triangle;",
+                  "Texture Ground\n": "Texture Chequers { pigment { checker color rgb 1 color rgb 0.2 } finish { phong grass } }\nTexture Ground\n"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", LOOKS)
+def test_surfaces_are_those_of_the_derivation(what):
+    text = SCENE.read_text()
+    for old, new in LOOKS[what].items():
+        assert old in text
+        text = text.replace(old, new, 1)
+    data = compile(text, parameters={"level": 4})
+    assert tiles(data) == 8
+    with Scene(data, accelerator="none") as scene:
+        expected = scene.render(48, 36, channels=("color", "normal", "symbol", "rule", "recursion"))
+    with Scene(data) as scene:
+        found = scene.render(48, 36, channels=("color", "normal", "symbol", "rule", "recursion"))
+    assert len(np.unique(expected["color"].reshape(-1, 3), axis=0)) > 50
+    for channel, values in expected.items():
+        np.testing.assert_array_equal(found[channel], values, channel)
+
+
 def test_what_few_tiles_do_not_show_is_learnt_from_more():
     data = compile(FLAT, parameters={"level": 7})
     assert tiles(data) == 512
