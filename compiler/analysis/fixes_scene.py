@@ -249,7 +249,8 @@ def within(spot: Spot, match: re.Match, message: Message) -> Found:
 
 
 def without_zeros(spot: Spot, match: re.Match, message: Message) -> Found:
-    return "Leave that axis at 1", [spot.replace(re.sub(r"(?<![\w.])0(?:\.0+)?(?![\w.])", "1", spot.text))]
+    written = re.sub(r"(?<![\w.])0(?:\.0+)?(?![\w.])", "1", spot.text)
+    return ("Leave that axis at 1", [spot.replace(written)]) if written != spot.text else None
 
 
 def gamma_one(spot: Spot, match: re.Match, message: Message) -> Found:

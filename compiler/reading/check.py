@@ -12,6 +12,7 @@ Example::
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 from . import affine
 from .check_camera import check_camera
@@ -20,7 +21,8 @@ from .check_paths import check_paths
 from .check_recursion import check_recursion
 from .diagnostics import Diagnostics
 from .evaluate import NotFinite, fold
-from .model import Apply, Assign, Calculate, Constant, Expression, Model, Step, Symbol
+from .intervals import ALL, Interval, interval_of, intervals_of
+from .model import Apply, Assign, Calculate, Constant, Expression, Model, Read, Step, Symbol
 from .resolve_names import ARTICLES
 from .source import Span
 from .walk import (
@@ -73,7 +75,7 @@ def check(model: Model, diagnostics: Diagnostics) -> None:
     if not diagnostics.has_errors:
         check_paths(model, diagnostics)
         check_recursion(model, diagnostics)
-        check_guards(model, diagnostics)
+        check_guards(model, checker.intervals, diagnostics)
         check_camera(model, diagnostics)
     checker.unused()
 
@@ -83,6 +85,16 @@ class _Checker:
         self.model, self.diagnostics = model, diagnostics
         self.seed = seed_of(model)
         self.reached = reached_symbols(model)
+        self.radians: set[Span] = set()  # where angles in radians have been reported
+        self.assigned: dict[str, list[Expression]] = {}
+        for operator in operators_of(model):
+            for statement in operator.statements if isinstance(operator, Calculate) else ():
+                if isinstance(statement, Assign):
+                    self.assigned.setdefault(statement.parameter, []).append(statement.value)
+
+    @cached_property
+    def intervals(self) -> dict[str, Interval]:
+        return intervals_of(self.model)
 
     def scene(self) -> None:
         start = Span(self.model.source, 0, 0)
@@ -137,14 +149,22 @@ class _Checker:
         if operation not in ANGLES:
             return
         angle = arguments[0]
-        named = [part for part in parts(angle) if isinstance(part, Constant) and part.value == math.pi]
-        radians = isinstance(angle, Constant) and any(abs(abs(angle.value) - r) < 1e-3 for r in RADIANS)
-        span = angle.span
-        if (named or radians) and span is not None:
-            message = f"{operation} takes degrees, and this looks like radians"
-            self.diagnostics.add(
-                "radians", span, message, "a full turn is 360; to convert, multiply by 180/pi"
-            )
+        if isinstance(angle, Apply) and angle.operation == "negate":
+            angle = angle.arguments[0]
+        if isinstance(angle, Read) and operation.startswith("rot"):
+            for value in self.assigned.get(angle.parameter, ()):
+                if _is_in_radians(value) and value.span is not None:
+                    self._in_radians(value.span, f"{operation} takes degrees, and '{angle.parameter}' looks like radians")
+            return
+        span = arguments[0].span
+        looks_so = isinstance(angle, Constant) and any(abs(abs(angle.value) - r) < 1e-3 for r in RADIANS)
+        if (looks_so or _is_in_radians(arguments[0])) and span is not None:
+            self._in_radians(span, f"{operation} takes degrees, and this looks like radians")
+
+    def _in_radians(self, span: Span, message: str) -> None:
+        if span not in self.radians:
+            self.radians.add(span)
+            self.diagnostics.add("radians", span, message, "a full turn is 360; to convert, multiply by 180/pi")
 
     # --- transformations
 
@@ -159,6 +179,7 @@ class _Checker:
             values = [fold(argument, self.seed) for argument in step.arguments]
         except NotFinite:
             return
+        values = [self._settled(value) for value in values]
         numbers = [value.value for value in values if isinstance(value, Constant)]
         if step.span is None or len(numbers) != len(values):
             return
@@ -180,6 +201,13 @@ class _Checker:
             xy, xz, yx, yz, zx, zy = numbers
             if affine.determinant((1, xy, xz, 0, yx, 1, yz, 0, zx, zy, 1, 0)) == 0:
                 self._singular(step.span)
+
+    def _settled(self, value: Expression) -> Expression:
+        """A value that is the same for all that parameters are assigned, as a constant."""
+        if isinstance(value, Constant):
+            return value
+        interval = interval_of(value, self.intervals) or ALL
+        return Constant(interval.low, value.span) if interval.low == interval.high else value
 
     def _singular(self, span: Span) -> None:
         message = "this transformation flattens what it acts on: its subtree is dropped"
@@ -275,6 +303,18 @@ def _divide_by_zero(folded: Expression, lazy: bool = False) -> None:
             raise NotFinite("division by zero", folded.span)
         for i, argument in enumerate(folded.arguments):
             _divide_by_zero(argument, folded.operation in ("and", "or", "select") and i > 0)
+
+
+def _is_in_radians(angle: Expression) -> bool:
+    """Whether an angle is made with pi, and not converted to degrees. What functions make of pi counts for nothing."""
+    numbers, waiting = [], [angle]
+    while waiting:
+        part = waiting.pop()
+        if isinstance(part, Constant):
+            numbers.append(part.value)
+        elif isinstance(part, Apply) and part.operation in ("add", "subtract", "multiply", "divide", "negate"):
+            waiting += part.arguments
+    return math.pi in numbers and not any(abs(number) in (180.0, 360.0) for number in numbers)
 
 
 def _finite_hint(reason: str) -> str:

@@ -40,9 +40,11 @@ def check_camera(model: Model, diagnostics: Diagnostics) -> None:
             _is_inside(shape, affine.transform_point(inverse, light), seed_of(model)) for light in lights
         ):
             message = f"the camera stands inside a {shape.shape}, where no light is"
-            diagnostics.add(
-                "camera-inside", span, message, "move its location, or put a light inside, as in a room"
-            )
+            hint = "move its location, or put a light inside, as in a room"
+            if shape.shape == "plane":
+                message = "the camera stands behind a plane, where no light is"
+                hint = "the plane's normal points away from it: move its location, or turn the normal round"
+            diagnostics.add("camera-inside", span, message, hint)
             return
 
 
@@ -94,6 +96,8 @@ def _is_inside(shape: Primitive, point: affine.Vector, seed: float) -> bool:
         return 0 < z < 1 and math.hypot(x, y) < radius
     if shape.shape == "box":
         return 0 < x < 1 and 0 < y < 1 and 0 < z < 1
+    if shape.shape == "plane":
+        return z < 0
     if shape.shape == "torus":
         return (math.hypot(x, y) - 1) ** 2 + z * z < arguments[0] ** 2
     return False

@@ -1,20 +1,21 @@
-"""Guards that can't hold because of the guards before them.
+"""Guards that come out one way only: because of the guards before them, or because of all that their parameters are
+assigned.
 
 On the way to a guard, the tests before it say in which interval each parameter lies. A comparison with a constant that no
-value there meets is reported.
+value there meets is reported. What the assignments alone decide is reported as well, but not where a recursion has been
+found wrong already.
 
 Example: in ``if (n > 0) A -> x; else if (n > 5) A -> y;`` the second guard never holds: n is at most 0 there.
 """
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
-
 from .diagnostics import Diagnostics
 from .evaluate import NotFinite, fold
+from .intervals import Interval, is_number
 from .model import Apply, Branch, Constant, Expression, Model, Production, Read
-from .walk import decided, seed_of
+from .source import Span
+from .walk import decided, parts, seed_of
 
 _OPPOSITE = {
     "less": "greater_equal", "greater_equal": "less", "greater": "less_equal", "less_equal": "greater",
@@ -28,53 +29,33 @@ _MIRRORED = {
 }
 
 
-class Interval(NamedTuple):
-    """From ``low`` to ``high``; an end may be left out."""
-
-    low: float = -math.inf
-    low_open: bool = False
-    high: float = math.inf
-    high_open: bool = False
-
-    def and_(self, operation: str, bound: float) -> Interval:
-        """The part of the interval where ``value operation bound`` holds."""
-        low, high = (self.low, self.low_open), (self.high, not self.high_open)
-        if operation in ("greater", "greater_equal", "equal"):
-            low = max(low, (bound, operation == "greater"))
-        if operation in ("less", "less_equal", "equal"):
-            high = min(high, (bound, operation != "less"))
-        return Interval(low[0], low[1], high[0], not high[1])
-
-    @property
-    def is_empty(self) -> bool:
-        return self.low > self.high or (self.low == self.high and (self.low_open or self.high_open))
-
-    def __str__(self) -> str:
-        """``n > 0 and n <= 5`` without the name, which stands for {}."""
-        ends = []
-        if self.low == self.high:
-            return f"{{}} is {self.low:g}"
-        if self.low > -math.inf:
-            ends.append(f"{{}} {'>' if self.low_open else '>='} {self.low:g}")
-        if self.high < math.inf:
-            ends.append(f"{{}} {'<' if self.high_open else '<='} {self.high:g}")
-        return " and ".join(ends)
-
-
 Intervals = dict[str, Interval]
 Comparison = tuple[str, str, float]  # parameter, operation, bound
 
 
-def check_guards(model: Model, diagnostics: Diagnostics) -> None:
-    """Report guards that what stands before them rules out."""
+def check_guards(model: Model, assigned: Intervals, diagnostics: Diagnostics) -> None:
+    """Report guards that what stands before them rules out, or that have one outcome for all that is ``assigned``."""
+    told = [item.span for item in diagnostics.items]
     checker = _Guards(seed_of(model), diagnostics)
     for symbol in model.symbols.values():
         checker.follow(symbol.production, {})
+        if not any(_is_in(span, symbol.span) for span in told):
+            checker.decided_by_assignments(symbol.production, assigned)
+
+
+def _is_in(inner: Span, outer: Span) -> bool:
+    return inner.source is outer.source and outer.start <= inner.start and inner.end <= outer.end
+
+
+def _is_of_numbers(test: Expression) -> bool:
+    """Whether all constants of a guard are written as numbers: named ones are there to be switched."""
+    return all(is_number(part) for part in parts(test) if isinstance(part, Constant))
 
 
 class _Guards:
     def __init__(self, seed: float, diagnostics: Diagnostics) -> None:
         self.seed, self.diagnostics = seed, diagnostics
+        self.told: set[Span] = set()
 
     def follow(self, production: Production, known: Intervals) -> None:
         """Look at the guards of ``production``, where the parameters lie in the intervals ``known``."""
@@ -91,9 +72,31 @@ class _Guards:
             known = self.narrowed(test, False, known) or known
             production = production.otherwise
 
+    def decided_by_assignments(self, production: Production, assigned: Intervals) -> None:
+        """Report guards that come out one way for all values that are ever assigned."""
+        waiting = [production]
+        while waiting:
+            production = waiting.pop()
+            if not isinstance(production, Branch):
+                continue
+            waiting += [production.then, production.otherwise]
+            test = production.test
+            if test.span is None or test.span in self.told or not _is_of_numbers(test):
+                continue
+            if decided(test, self.seed) is not None:
+                continue
+            for outcome in (True, False):
+                if self.narrowed(test, outcome, assigned) is None:
+                    names = sorted({part[0] for part in self.comparisons(test, outcome) if part[0] in assigned})
+                    told = "; ".join(str(assigned[name]).format(*[f"'{name}'"] * 2) for name in names)
+                    message = f"this guard is always {'false' if outcome else 'true'}: {told} wherever it is assigned"
+                    self.diagnostics.add("constant-guard", test.span, message, "to switch it by hand, use a Parameter or a #declare")
+                    break
+
     def report(self, test: Expression, known: Intervals) -> None:
         if test.span is None or decided(test, self.seed) is not None:
             return
+        self.told.add(test.span)
         names = sorted({part[0] for part in self.comparisons(test, True) if part[0] in known})
         told = "; ".join(str(known[name]).format(*[f"'{name}'"] * 2) for name in names)
         self.diagnostics.add("constant-guard", test.span, f"this guard is always false: here {told}",

@@ -193,10 +193,13 @@ class Items:
 
     def _look_for_bytes(self, parts: Sequence[Expression], span: Span) -> None:
         shown = [part.value for part in parts[:3] if isinstance(part, Constant)]
-        if any(value > 20 for value in shown) and all(
+        is_named = span.text.split()[-1:] and span.text.split()[-1].isidentifier()
+        if any(value > 20 for value in shown) and not is_named and all(
             value == int(value) and 0 <= value <= 255 for value in shown
         ):
-            hint = f"perhaps rgb <{', '.join(f'{value:g}/255' for value in shown)}>"
+            hint = "divide them by 255"
+            if len(shown) == 3:
+                hint = f"perhaps rgb <{', '.join(f'{value:g}/255' for value in shown)}>"
             self.diagnostics.add("colour-range", span, "a colour's components are from 0 to 1", hint)
 
     # --- what doesn't belong

@@ -310,8 +310,10 @@ class Textures:
             return (Step("trans", tuple(map(Constant, values)), span),)
         if word == "rotate":
             # About x first: the last step acts first.
-            pairs = [("rotz", values[2]), ("roty", values[1]), ("rotx", values[0])]
-            return tuple(Step(name, (Constant(angle),), span) for name, angle in pairs if angle != 0)
+            written = items.items[begin]
+            parts = written.components if isinstance(written, syntax.Vector) and len(written.components) == 3 else [written] * 3
+            pairs = [(f"rot{axis}", values[i], parts[i].span) for i, axis in reversed(list(enumerate("xyz")))]
+            return tuple(Step(name, (Constant(angle, at),), span) for name, angle, at in pairs if angle != 0)
         if 0.0 in values:
             raise Problem("degenerate", span, "a scale of 0 flattens what it acts on", "leave that axis at 1")
         if values[0] == values[1] == values[2]:

@@ -222,8 +222,50 @@ def test_counters_one_after_the_other():
 )  # fmt: skip
 def test_guards_that_earlier_ones_rule_out(first, second, said):
     rules = f"if ({first}) A -> box; else if ({second}) A -> cone; else A -> sphere;"
-    text = f"Selection A {{ [ n = 4; m = 2 ] A; {rules} }} object {{ A }}"
+    text = f"Selection A {{ [ n = 9*rand(0) - 5; m = 9*rand(1) - 5 ] A; {rules} }} object {{ A }}"
     assert ("constant-guard" in codes(text)) == said
+
+
+@pytest.mark.parametrize(
+    "values, guard, said",
+    [
+        ("n = 5;", "n > 3", "true: 'n' is 5"), ("n = 5;", "n > 5", "false: 'n' is 5"), ("n = 5; n += 2;", "n > 4", "true: 'n' >= 5"),
+        ("n = 5; --n;", "n > 5", "false: 'n' <= 5"), ("n = 5; --n;", "n > 4", ""), ("n = p;", "n > 0", ""), ("n = C;", "n == 2", ""),
+        ("n = 5;", "n > C", ""), ("n = 2 + rand(0);", "n >= 2 && n <= 3", ""), ("n = 2 + rand(0);", "n < 2", "false: 'n' >= 2 and 'n' <= 3"),
+        ("m = 3; n = m*2 - 1;", "n == 5 || m < 0", "true"), ("n = rand(0) < 0.5 ? 1 : 3;", "n > 3", "false"), ("n = max(4, hash(1));", "n <= 4", "true"),
+        ("n = floor(rand(0)*3);", "n < 0", "false"), ("n = n0/2;", "n > 0", ""), ("n = -(-7);", "n != 7", "false: 'n' is 7"),
+    ],
+)  # fmt: skip
+def test_guards_that_assignments_decide(values, guard, said):
+    """Inputs and named constants are there to be switched."""
+    head = "Parameter p = 3 [0 to 9];\n#declare C = 2;\nCalculation C_0 { n0 = 1; m = 0; }\n" if "n0" in values else "Parameter p = 3 [0 to 9];\n#declare C = 2;\n"
+    start = "C_0 C_i" if "n0" in values else "C_i"
+    text = f"{head}Calculation C_i {{ {values} }}\nSelection A {{ {start} A; if ({guard}) A -> box; else A -> cone; }}\nobject {{ A scale p*C }}"
+    found = [each.message for each in read(text)[1].items if each.code == "constant-guard"]
+    assert len(found) == bool(said) and all(f"always {said}" in each for each in found)
+
+
+@pytest.mark.parametrize(
+    "angle, said",
+    [
+        ("roty pi/2", True), ("rotz 1.5708", True), ("roty a", True), ("roty -a", True), ("roty 180*2/pi", False), ("roty b", False), ("roty 1.5", False),
+        ("scale pi", False), ("rot 2*pi/5 0 0 1", True), ("roty sin(pi/3)", True),
+    ],
+)  # fmt: skip
+def test_angles_that_look_like_radians(angle, said):
+    text = f"object {{ A }} Selection A {{ [ a = pi/3; b = 180*a/pi ] A; A -> [ {angle}; scale a*b ] box; }}"
+    assert codes(text).count("radians") == said
+
+
+def test_modifiers_in_radians():
+    _, diagnostics = read("object { A rotate <0, pi/2, 30> } object { A rotate 90*x } Selection A { A -> box; }")
+    assert [each.span.text for each in diagnostics.items if each.code == "radians"] == ["pi/2"]
+
+
+@pytest.mark.parametrize("values, said", [("k = 0;", True), ("k = 1; k -= 1;", False), ("k = 2;", False), ("k = 3; m = k - k*1;", False)])
+def test_a_scale_that_is_always_zero(values, said):
+    text = f"object {{ A }} Calculation C_i {{ m = 1; {values} }} Selection A {{ C_i A; A -> [ scale k*m 1 k ] box; }}"
+    assert ("singular" in codes(text)) == said
 
 
 @pytest.mark.parametrize(
@@ -231,7 +273,7 @@ def test_guards_that_earlier_ones_rule_out(first, second, said):
     [
         ("sphere { 0, 20 }", True), ("sphere { 0, 5 }", False), ("sphere { 0, 200 }", False), ("object { A scale 20 }", True),
         ("box { -20, 20 }", True), ("cylinder { <0, -20, 0>, <0, 9, 0>, 1 }", True), ("torus { 10, 1 rotate 90*x }", True),
-        ("torus { 5, 1 }", False), ("cone { <0, -20, 0>, 2, <0, 0, 0>, 0.1 }", True), ("plane { y, 0 }", False),
+        ("torus { 5, 1 }", False), ("cone { <0, -20, 0>, 2, <0, 0, 0>, 0.1 }", True), ("plane { y, 0 }", False), ("plane { z, 5 }", True), ("plane { -z, 5 }", False),
     ],
 )  # fmt: skip
 def test_a_camera_inside(placed, said):
