@@ -10,12 +10,14 @@ Example: in ``if (n > 0) A -> x; else if (n > 5) A -> y;`` the second guard neve
 
 from __future__ import annotations
 
+from bisect import bisect_left, insort
+
 from .diagnostics import Diagnostics
 from .evaluate import NotFinite, fold
-from .intervals import Interval, is_number
+from .intervals import ALL, Interval, is_number
 from .model import Apply, Branch, Constant, Expression, Model, Production, Read
 from .source import Span
-from .walk import decided, parts, seed_of
+from .walk import decided, parts, reads, seed_of
 
 _OPPOSITE = {
     "less": "greater_equal", "greater_equal": "less", "greater": "less_equal", "less_equal": "greater",
@@ -35,16 +37,18 @@ Comparison = tuple[str, str, float]  # parameter, operation, bound
 
 def check_guards(model: Model, assigned: Intervals, diagnostics: Diagnostics) -> None:
     """Report guards that what stands before them rules out, or that have one outcome for all that is ``assigned``."""
-    told = [item.span for item in diagnostics.items]
+    told: dict[int, list[int]] = {}  # where messages start, by file
+    for item in diagnostics.items:
+        insort(told.setdefault(id(item.span.source), []), item.span.start)
     checker = _Guards(seed_of(model), diagnostics)
     for symbol in model.symbols.values():
         checker.follow(symbol.production, {})
-        if not any(_is_in(span, symbol.span) for span in told):
+        if not _has_any(told.get(id(symbol.span.source), []), symbol.span):
             checker.decided_by_assignments(symbol.production, assigned)
 
 
-def _is_in(inner: Span, outer: Span) -> bool:
-    return inner.source is outer.source and outer.start <= inner.start and inner.end <= outer.end
+def _has_any(starts: list[int], span: Span) -> bool:
+    return bisect_left(starts, span.start) < bisect_left(starts, span.end)
 
 
 def _is_of_numbers(test: Expression) -> bool:
@@ -81,9 +85,9 @@ class _Guards:
                 continue
             waiting += [production.then, production.otherwise]
             test = production.test
+            if all(assigned.get(name, ALL) == ALL for name in reads(test)):
+                continue  # of literals, or of parameters that may be anything
             if test.span is None or test.span in self.told or not _is_of_numbers(test):
-                continue
-            if decided(test, self.seed) is not None:
                 continue
             for outcome in (True, False):
                 if self.narrowed(test, outcome, assigned) is None:
