@@ -112,12 +112,13 @@ def read(scene: str | Path | Source) -> Source:
         raise PlsysError(f"can't be read: {getattr(error, 'strerror', None) or error}", str(scene)) from None
 
 
-def build_graph(model: Model) -> Graph:
-    """The graph of a model without errors, after all passes."""
+def build_graph(model: Model, is_verified: bool = True) -> Graph:
+    """The graph of a model without errors, after all passes. Unless ``is_verified``, it isn't looked for mistakes of ours:
+    where nothing is drawn from it and time counts."""
     from .graph.lower import lower
     from .graph.passes import run_passes
 
-    return run_passes(lower(model))
+    return run_passes(lower(model), is_verified)
 
 
 @contextmanager

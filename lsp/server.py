@@ -33,6 +33,8 @@ MANY_OBJECTS = 50_000
 
 # Whole-file checks begin when nothing was typed for so long: their snapshot costs some milliseconds.
 PAUSE_S = 0.1
+# When a pause is looked for again where something was to do just then.
+BUSY_S = 0.005
 
 
 class Dispatcher:
@@ -46,7 +48,7 @@ class Dispatcher:
         self.session = Session(self.send, self._wake)
         self.inbox: deque[Any] = deque()
         self.cancelled: set[Any] = set()
-        self._scheduled = self._has_opened = self._has_closed = False
+        self._scheduled = self._has_opened = self._has_closed = self._has_heard = False
         self._pause: asyncio.TimerHandle | None = None
 
     def deliver(self, body: bytes) -> None:
@@ -99,16 +101,27 @@ class Dispatcher:
                 gc.freeze()
                 gc.enable()
                 self._has_opened = False
-            if self._pause is not None:
-                self._pause.cancel()
-            self._pause = asyncio.get_running_loop().call_later(PAUSE_S, self._rest)
+            self._await_pause()
         if self.session.exit_code is not None:
             self.leave()
         elif self.is_busy:
             self._schedule()
 
+    def _await_pause(self) -> None:
+        """Have ``_rest`` called when the client has said nothing for a while. Work that workers left is no reason to wait."""
+        if self._pause is not None and self._has_heard:
+            self._pause.cancel()
+            self._pause = None
+        if self._pause is None:
+            self._pause = asyncio.get_running_loop().call_later(PAUSE_S, self._rest)
+        self._has_heard = False
+
     def _rest(self) -> None:
         """The client has paused: do what need not be done between two keys."""
+        if self.is_busy:
+            self._pause = asyncio.get_running_loop().call_later(BUSY_S, self._rest)
+            return
+        self._pause = None
         self.session.start_checks()
         if self._has_closed:  # what was known about a file refers to itself
             self._has_closed = False
@@ -122,6 +135,7 @@ class Dispatcher:
         if self.is_busy:
             delay = PAUSE_S
         elif self.session.prepare():
+            self._pause = None
             return
         else:
             delay = 0.0
@@ -133,6 +147,7 @@ class Dispatcher:
             self.cancelled.discard(number)
             self.session.refuse_cancelled(number)
             return
+        self._has_heard = True
         self.session.receive(message)
         if isinstance(message, dict) and message.get("method") == "textDocument/didOpen":
             self._has_opened = True

@@ -374,13 +374,11 @@ class Session:
     def _take(self, result: Result) -> None:
         """Show what the whole-file checks found."""
         result.apply()
-        if result.answer.more and self._checker is not None:
-            self._checker.want(result.snapshot.scene)
-            self._checker.go()
+        if not result.answer.more:
+            self.progress.end("checks")
+        elif result.answer.share is not None:
             name = result.snapshot.scene.root.text.name.rpartition("/")[2]
             self.progress.report("checks", "Checking", name, int(100 * result.answer.share))
-        elif result.answer.is_last:
-            self.progress.end("checks")
         for document in result.snapshot.scene.documents:
             if document in self.workspace.uris:
                 self._changed[document] = None
@@ -388,7 +386,7 @@ class Session:
         if refresh and (self.client.get("textDocument") or {}).get("diagnostic") is not None:
             self.ask("workspace/diagnostic/refresh")
         refresh = ((self.client.get("workspace") or {}).get("inlayHint") or {}).get("refreshSupport")
-        if refresh and (result.answer.insights or (result.answer.is_last and not result.answer.more)):
+        if refresh and (result.answer.insights or not result.answer.more):
             self.ask("workspace/inlayHint/refresh")
 
     def _publish(self, document: Document) -> None:

@@ -1,8 +1,8 @@
 """Whole-file checks: what only shows when a scene is looked at together, in a process of its own.
 
 A :class:`Checker` keeps a worker process (checking.py), which runs the compiler's checks and forecast on a snapshot of a
-scene; one interpreter can't do that and answer keys in time. Of snapshots that wait, only the latest of each scene is
-checked, and the worker is sent only what differs from the one before.
+scene; one interpreter can't do that and answer keys in time. The worker is sent only what differs from the snapshot before,
+at once: it turns to the latest text as soon as it is done with a part (checking.py).
 :func:`run` is the work itself, for tests and tools that have the time.
 
 Example::
@@ -16,6 +16,7 @@ Example::
 from __future__ import annotations
 
 import pickle
+import queue
 import subprocess
 import threading
 from dataclasses import dataclass
@@ -24,7 +25,8 @@ from typing import Callable
 from ..reading.diagnostics import Diagnostic, Note
 from ..reading.source import Span
 from . import worker
-from .checking import Answer, FileText, Finding, Request, Work
+from .checking import Work
+from .exchange import Answer, FileText, Finding, Request
 from .insights import kept
 from .scene import Scene
 from .text import Block
@@ -49,14 +51,28 @@ class Snapshot:
         known = dict(zip([file.name for file in before.request.files], before.blocks)) if before is not None else {}
         files = []
         for document, several in zip(scene.documents, blocks):
-            old = known.get(document.text.name, [])
-            start, end = _difference(old, several)
-            data = tuple(block.data for block in several[start : len(several) - end])
-            files.append(FileText(document.text.name, document.path, start, end, data))
+            pieces = _pieces(known.get(document.text.name, []), several)
+            files.append(FileText(document.text.name, document.path, pieces))
         return cls(scene, blocks, Request(number, scene.number, tuple(files)))
 
 
-def _difference(old: list[Block], new: list[Block]) -> tuple[int, int]:
+def _pieces(old: list[Block], new: list[Block]) -> tuple[bytes | tuple[int, int], ...]:
+    """``new`` as texts of blocks that ``old`` hasn't, and ranges of those that it has."""
+    start, end = _same(old, new)
+    numbers = {block: i for i, block in enumerate(old[start : len(old) - end], start)}
+    pieces: list[bytes | tuple[int, int]] = [(0, start)]
+    for block in new[start : len(new) - end]:
+        number, last = numbers.get(block), pieces[-1]
+        if number is None:
+            pieces.append(block.data)
+        elif isinstance(last, tuple) and last[1] == number:
+            pieces[-1] = last[0], number + 1
+        else:
+            pieces.append((number, number + 1))
+    return *pieces, (len(old) - end, len(old))
+
+
+def _same(old: list[Block], new: list[Block]) -> tuple[int, int]:
     """How many blocks at the start and at the end are the same."""
     shorter, step = min(len(old), len(new)), 256
     start = next((i for i in range(0, shorter, step) if old[i : i + step] != new[i : i + step]), shorter)
@@ -83,7 +99,7 @@ class Result:
             scene.whole.pop(self.snapshot.blocks[file][number], None)
         for file, number in answer.forecast_of:
             scene.insights.pop(self.snapshot.blocks[file][number], None)
-        scene.insights.update(kept(answer.insights or (), self._span))
+        scene.insights.update(kept(answer.insights, self._span))
         scene.general.clear()
         for finding in answer.findings:
             self._keep(finding, scene.whole)
@@ -118,10 +134,11 @@ class Checker:
     def __init__(self, deliver: Callable[[Result], None]) -> None:
         self.deliver = deliver
         self._process: subprocess.Popen | None = None
+        self._outbox: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._number = 0
         self._wanted: dict[Scene, None] = {}
-        self._running: Snapshot | None = None
         self._sent: dict[Scene, Snapshot] = {}  # what the worker knows
+        self._unanswered: dict[int, Snapshot] = {}  # by number: those that answers may still be about
         self._lock = threading.Lock()
 
     def want(self, scene: Scene) -> None:
@@ -129,34 +146,30 @@ class Checker:
         self._wanted[scene] = None
 
     def go(self) -> None:
-        """Send the worker a scene that was asked for, unless it is at work. On the thread that owns the scenes."""
+        """Send the worker the scenes that were asked for. On the thread that owns the scenes."""
+        wanted, self._wanted = [scene for scene in self._wanted if scene.is_alive], {}
         with self._lock:
-            if self._running is not None or not self._wanted:
-                return
-            self._wanted = {scene: None for scene in self._wanted if scene.is_alive}
-            if not self._wanted:
-                return
-            scene = next(iter(self._wanted))
-            del self._wanted[scene]
-            self._number += 1
-            try:
-                process = self._process or self._start()
-            except OSError:
-                return  # no process to be had: editing goes on without these checks
-            snapshot = Snapshot.of(scene, self._number, self._sent.pop(scene, None))
-            gone = [other for other in self._sent if not other.is_alive]
-            gone += [other for other in self._sent if other.is_alive][: max(0, len(self._sent) - len(gone) - MAX_KNOWN)]
-            for other in gone:
-                del self._sent[other]
-            snapshot.request = snapshot.request._replace(forget=tuple(other.number for other in gone))
-            self._running = self._sent[scene] = snapshot
-        data = pickle.dumps(snapshot.request)
-        # The pipe may be full while the worker works.
-        threading.Thread(target=worker.write, args=(process, data), daemon=True).start()
+            for scene in wanted:
+                try:
+                    self._process = self._process or self._start()
+                except OSError:
+                    return  # no process to be had: editing goes on without these checks
+                self._send(scene)
+
+    def _send(self, scene: Scene) -> None:
+        self._number += 1
+        snapshot = Snapshot.of(scene, self._number, self._sent.pop(scene, None))
+        gone = [other for other in self._sent if not other.is_alive]
+        gone += [other for other in self._sent if other.is_alive][: max(0, len(self._sent) - len(gone) - MAX_KNOWN)]
+        for other in gone:
+            self._unanswered.pop(self._sent.pop(other).request.key, None)
+        snapshot.request = snapshot.request._replace(forget=tuple(other.number for other in gone))
+        self._sent[scene] = self._unanswered[self._number] = snapshot
+        self._outbox.put(pickle.dumps(snapshot.request))
 
     @property
     def is_idle(self) -> bool:
-        return self._running is None and not self._wanted
+        return not self._unanswered and not self._wanted
 
     def close(self) -> None:
         """End the worker."""
@@ -164,22 +177,38 @@ class Checker:
         if process is not None:
             process.kill()
             process.wait()
+            self._outbox.put(None)
 
     def _start(self) -> subprocess.Popen:
-        self._process = worker.start(Work.__module__)
-        threading.Thread(target=self._read, args=(self._process,), daemon=True).start()
-        return self._process
+        process, self._outbox = worker.start(Work.__module__), queue.SimpleQueue()
+        # The pipe may be full while the worker works.
+        threading.Thread(target=self._write, args=(process, self._outbox), daemon=True).start()
+        threading.Thread(target=self._read, args=(process,), daemon=True).start()
+        return process
+
+    @staticmethod
+    def _write(process: subprocess.Popen, outbox: queue.SimpleQueue[bytes | None]) -> None:
+        for data in iter(outbox.get, None):
+            worker.write(process, data)
 
     def _read(self, process: subprocess.Popen) -> None:
         for answer in worker.answers(process):
             with self._lock:
-                snapshot = self._running
-                if snapshot is None or answer.key != snapshot.request.key:
+                snapshot = self._unanswered.get(answer.key)
+                if snapshot is None:
                     continue
-                if answer.is_last:
-                    self._running = None
+                self._answered(snapshot, answer.more)
             self.deliver(Result(snapshot, answer))
         with self._lock:
             if self._process is process:  # it died of a scene; the next one gets another
-                self._process = self._running = None
+                self._process = None
+                self._outbox.put(None)
                 self._sent.clear()
+                self._unanswered.clear()
+
+    def _answered(self, snapshot: Snapshot, more: bool) -> None:
+        """Of earlier texts of the scene nothing will be said, and of this one not unless there is ``more``."""
+        number = snapshot.request.key
+        for other in [n for n, each in self._unanswered.items() if each.scene is snapshot.scene]:
+            if other < number or (other == number and not more):
+                del self._unanswered[other]

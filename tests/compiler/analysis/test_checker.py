@@ -52,3 +52,19 @@ def test_scenes_that_were_closed_are_left_out(checker, results):
     scene.root.scenes.clear()
     checker.go()
     assert checker.is_idle
+
+
+def test_texts_that_follow_each_other_before_one_is_checked(checker, results):
+    head = b"camera { }\nlight_source { <0, 0, 9> color rgb 1 }\n"
+    plant = b"object { A%d }\nSelection A%d { A%d -> C%d box; }\nCalculation C%d { n%d = 1; }\n"
+    plants = b"".join(plant % ((i,) * 6) for i in range(40))
+    project = Project()
+    document = project.open(None, head + plants, name="x")
+    scene = project.scene_of(document)
+    for i in range(40):
+        at = document.text.data.index(b"-> C%d box" % i) + 3
+        project.edit(document, at, at + len(b"C%d " % i), b"")
+        scene.work()
+        checker.want(scene)
+        checker.go()
+    assert codes(checker, results, scene, document) == ["unused"] * 40

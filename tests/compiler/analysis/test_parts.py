@@ -97,14 +97,51 @@ def test_an_edit_is_checked_with_its_own_part():
     assert answers[-1].findings  # n1 isn't counted down
 
 
+def test_edits_far_apart_leave_what_lies_between():
+    project, work = Project(), Work()
+    document = project.open(None, SCENE.encode(), name="x")
+    scene = project.scene_of(document)
+    answers: list = []
+    first = Snapshot.of(scene, 0)
+    work.run(first.request, answers.append)
+    for name in ("--n2", "--n0"):
+        at = SCENE.index(name) + 3
+        project.edit(document, at, at + 1, b"1")
+    second = Snapshot.of(scene, 1, first)
+    assert [len(file.blocks) for file in second.request.files] == [2]
+    work.run(second.request, answers.append)
+    third = Snapshot.of(scene, 2, second)
+    assert [len(file.blocks) for file in third.request.files] == [0]
+    assert [block.data for block in document.text.blocks] == [
+        block.data for block in work.scenes[scene.number].blocks[document.text.name]
+    ]
+
+
+def test_the_latest_text_comes_before_what_is_left_of_an_earlier_one():
+    project, work = Project(), Work()
+    document = project.open(None, SCENE.encode(), name="x")
+    scene = project.scene_of(document)
+    answers: list = []
+    first = Snapshot.of(scene, 0)
+    work.take(first.request)
+    work.go_on(answers.append, lambda: True)
+    at = SCENE.index("--n1") + 2
+    project.edit(document, at, at + 2, b"n2")
+    work.take(Snapshot.of(scene, 1, first).request)
+    work.go_on(answers.append, lambda: True)
+    assert [answer.key for answer in answers] == [0, 1]
+    assert answers[-1].more and answers[-1].findings  # n1 isn't counted down
+    work.go_on(answers.append)
+    assert not answers[-1].more and work.is_done
+
+
 def test_a_slice_leaves_the_rest_for_later():
     project, work = Project(), Work()
     scene = project.scene_of(project.open(None, SCENE.encode(), name="x"))
-    answers, before = [], None
-    while not answers or answers[-1].more:
-        snapshot = Snapshot.of(scene, len(answers), before)
-        work.run(snapshot.request, answers.append, 0.0)
-        before = snapshot
+    answers: list = []
+    work.take(Snapshot.of(scene, 0).request)
+    while not work.is_done:
+        work.go_on(answers.append, lambda: True)
     assert len(answers) > 4
     assert answers[-1].forecast["primitives"] == 3 * 4
 

@@ -1,0 +1,105 @@
+"""What an answer of the whole-file checks says: outcomes of parts → an :class:`Answer`, with places as numbers.
+
+Example: ``answer(scene, request, places, new)`` tells what was found out about the parts ``new``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Iterable
+
+from ..reading.diagnostics import Diagnostic
+from ..reading.source import Span
+from .exchange import Answer, Finding, Request
+from .insights import placed
+from .parts import Part
+from .text import Block
+
+if TYPE_CHECKING:
+    from .checking import SceneState
+
+# Said once of a scene, not of each part.
+_MISSING = frozenset(("no-camera", "no-object", "no-light"))
+
+# What isn't sure while a block that can't be read may hold a use.
+_UNSURE = frozenset(("unused", "unreachable"))
+
+
+def answer(scene: SceneState, request: Request, places: dict[Block, tuple[int, int]], new: Iterable[Part]) -> Answer:
+    """``new`` are parts of which more is known than was told; ``places`` are the numbers of each block's file and of the
+    block in it."""
+    return _Told(scene, places).answer(request.key, dict.fromkeys(new))
+
+
+class _Told:
+    def __init__(self, scene: SceneState, places: dict[Block, tuple[int, int]]) -> None:
+        self.scene, self.places = scene, places
+        self.parts = [part for part in scene.parts if part.outcome is not None]
+
+    def answer(self, key: int, new: dict[Part, None]) -> Answer:
+        scene = self.scene
+        is_unsure = not scene.is_complete or any(part.outcome.is_broken for part in self.parts)
+        scene.unsure.intersection_update(self.parts)
+        told = set(new) if is_unsure else scene.unsure.union(new)
+        scene.unsure = scene.unsure.union(new) if is_unsure else set()
+        own, general = self._diagnostics(told)
+        findings = [each for each in own if not (is_unsure and each.code in _UNSURE)]
+        shown = [part for part in new if part.outcome.insights is not None]
+        left = sum(part.outcome is None or part.outcome.model is not None for part in scene.parts)
+        return Answer(
+            key,
+            tuple(self.places[block] for part in told for block in part.blocks),
+            tuple(map(self._finding, findings)),
+            tuple(map(self._finding, general)),
+            tuple(each for part in shown for each in placed(part.outcome.insights, self._place)),
+            tuple(self.places[block] for part in shown for block in part.blocks),
+            None if left else _total(self.parts),
+            left > 0,
+        )
+
+    def _diagnostics(self, told: set[Part]) -> tuple[list[Diagnostic], list[Diagnostic]]:
+        """Those about the blocks of parts that are told, and all those about what parts share."""
+        own: list[Diagnostic] = []
+        general: dict[tuple, Diagnostic] = {}
+        missing: dict[str, Diagnostic] = {}
+        for part in self.parts:
+            if not part.outcome.diagnostics:
+                continue
+            blocks = set(part.blocks)
+            for each in part.outcome.diagnostics:
+                if each.code in _MISSING:
+                    if self.scene.is_complete and (part is self.scene.parts.base or each.code == "no-object"):
+                        missing[each.code] = each
+                elif each.span.source not in blocks:
+                    general.setdefault((each.code, each.span.source, each.span.start), each)
+                elif part in told:
+                    own.append(each)
+        return own, [*missing.values(), *general.values()]
+
+    def _place(self, span: Span) -> tuple[int, int, int, int]:
+        return (*self.places.get(span.source, (0, 0)), span.start, span.end)  # type: ignore[call-overload]
+
+    def _finding(self, d: Diagnostic) -> Finding:
+        notes = tuple((*self._place(note.span), note.message) for note in d.notes)
+        return Finding(*self._place(d.span), d.code, d.severity, d.message, d.hint, notes)
+
+
+def _total(parts: Iterable[Part]) -> dict[str, Any] | None:
+    """The forecasts of all parts together; None where one isn't known."""
+    found = [part.outcome.forecast for part in parts]
+    if None in found:
+        return None
+    kinds = dict.fromkeys(kind for each in found for kind in each.by_kind)
+    bounds = zip(*(each.primitives_range for each in found))
+    return {
+        "primitives": _sum(each.primitives for each in found),
+        "by_kind": {kind: _sum(each.by_kind.get(kind, 0) for each in found) for kind in kinds},
+        "primitives_range": tuple(_sum(values) for values in bounds),
+        "states": _sum(each.states for each in found),
+        "depth": None if any(each.depth is None for each in found) else max((each.depth for each in found), default=0),
+        "infinite": any(each.infinite for each in found),
+    }
+
+
+def _sum(values: Iterable[Any]) -> Any:
+    values = list(values)
+    return None if None in values else sum(values)
