@@ -17,12 +17,12 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from functools import cached_property
-from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
 from ..reading.source import Source
 from .split import Piece, Shape, group, split
+from .sums import Sums
 
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 
@@ -65,11 +65,7 @@ class Text:
     def __init__(self, name: str, path: Path | None, data: bytes) -> None:
         self.name, self.path = name, path
         self.blocks: list[Block] = []
-        self._lengths: list[int] = []  # bytes of each block
-        self._line_ends: list[int] = []  # line ends in each block
-        # Sums of the two up to each block. Edits cut them off and lookups extend them, so that many edits from the end
-        # of the file to its start, as of many cursors, sum up once.
-        self._starts, self._lines = [0], [0]
+        self._starts, self._lines = Sums(), Sums()  # bytes and line ends before each block
         self._order: dict[Block, int] | None = None
         self._loose: list[Block] = []  # blocks with an open brace or comment: an edit further down may end it
         self._put(0, 0, data)
@@ -78,19 +74,13 @@ class Text:
 
     @property
     def starts(self) -> list[int]:
-        """Where each block starts, and last the length of the text."""
-        known = len(self._starts) - 1
-        if known < len(self._lengths):
-            self._starts[known:] = accumulate(self._lengths[known:], initial=self._starts[known])
-        return self._starts
+        """Where each block starts, and last the length of the text; valid up to the next edit."""
+        return self._starts.all()
 
     @property
     def first_lines(self) -> list[int]:
-        """The line on which each block starts, and last the file's last line."""
-        known = len(self._lines) - 1
-        if known < len(self._line_ends):
-            self._lines[known:] = accumulate(self._line_ends[known:], initial=self._lines[known])
-        return self._lines
+        """The line on which each block starts, and last the file's last line; valid up to the next edit."""
+        return self._lines.all()
 
     @property
     def order(self) -> dict[Block, int]:
@@ -100,7 +90,7 @@ class Text:
         return self._order
 
     def __len__(self) -> int:
-        return self.starts[-1]
+        return self._starts.total
 
     @property
     def data(self) -> bytes:
@@ -109,8 +99,7 @@ class Text:
 
     def index_at(self, offset: int) -> int:
         """The index of the block with the byte at ``offset``; at the end of the text, of the last block."""
-        starts = self._starts if offset < self._starts[-1] else self.starts
-        return max(0, min(bisect_right(starts, offset) - 1, len(self.blocks) - 1))
+        return max(0, min(self._starts.find(offset), len(self.blocks) - 1))
 
     def block_at(self, offset: int) -> tuple[Block, int]:
         """The block with the byte at ``offset``, and where in the file it starts."""
@@ -120,28 +109,26 @@ class Text:
     def start_of(self, block: Block) -> int | None:
         """Where ``block`` starts in the file, None if it is no longer part of it."""
         index = self.order.get(block)
-        return None if index is None else self.starts[index]
+        return None if index is None else self._starts[index]
 
     # --- lines
 
     @property
     def line_count(self) -> int:
-        return self.first_lines[-1] + 1
+        return self._lines.total + 1
 
     def locate(self, offset: int) -> tuple[int, bytes]:
         """The line with the byte at ``offset``, and that line's text before it."""
         index = self.index_at(offset)
         block, inside = self.blocks[index], offset - self._starts[index]
-        lines = self._lines if index < len(self._lines) else self.first_lines
         line = bisect_right(block.line_starts, inside) - 1
-        return lines[index] + line, block.data[block.line_starts[line] : inside].rstrip(b"\r\n")
+        return self._lines[index] + line, block.data[block.line_starts[line] : inside].rstrip(b"\r\n")
 
     def line_of(self, offset: int) -> int:
         return self.locate(offset)[0]
 
     def _index_of_line(self, line: int) -> int:
-        lines = self._lines if line < self._lines[-1] else self.first_lines
-        return min(bisect_right(lines, line) - 1, len(self.blocks) - 1)
+        return min(self._lines.find(line), len(self.blocks) - 1)
 
     def line_start(self, line: int) -> int:
         """The offset of a line's first byte; of lines past the end, the text's length."""
@@ -150,7 +137,7 @@ class Text:
         starts = self.blocks[index].line_starts
         if inside >= len(starts):
             return len(self)
-        return (self._starts if index < len(self._starts) else self.starts)[index] + starts[inside]
+        return self._starts[index] + starts[inside]
 
     def line_bytes(self, line: int) -> bytes:
         """The text of a line without its line end."""
@@ -171,9 +158,8 @@ class Text:
 
     def replace(self, start: int, end: int, data: bytes) -> Change:
         """Put ``data`` in the place of the bytes from ``start`` to ``end``."""
-        if not 0 <= start <= end < self._starts[-1]:
-            start = max(0, min(start, len(self)))
-            end = max(start, min(end, len(self)))
+        start = max(0, min(start, len(self)))
+        end = max(start, min(end, len(self)))
         return self._put(start, end, data)
 
     def _put(self, start: int, end: int, data: bytes) -> Change:
@@ -202,9 +188,7 @@ class Text:
             high += taken
         change, head = self._exchange(low, high, [(new[piece.start : piece.end], piece.shape) for piece in joined])
         if len(change.removed) == len(change.added) == 1:
-            # What was taken in behind the edit may lie where starts aren't summed up.
-            starts = self._starts if low + head < len(self._starts) else self.starts
-            base = starts[low + head]
+            base = self._starts[low + head]
             _link(change, start - base, end - base, len(data))
         return change
 
@@ -231,9 +215,8 @@ class Text:
         added = [Block(self.name, data, self.path, shape) for data, shape in texts[head : len(texts) - tail]]
         removed = old[head : len(old) - tail]
         self.blocks[low + head : high - tail] = added
-        self._lengths[low + head : high - tail] = [len(block.data) for block in added]
-        self._line_ends[low + head : high - tail] = [block.line_ends for block in added]
-        del self._starts[low + head + 1 :], self._lines[low + head + 1 :]
+        self._starts.exchange(low + head, high - tail, [len(block.data) for block in added])
+        self._lines.exchange(low + head, high - tail, [block.line_ends for block in added])
         if self._order is not None and len(added) == len(removed):
             for index, (block, new) in enumerate(zip(removed, added), low + head):
                 del self._order[block]
