@@ -26,6 +26,9 @@ from .sums import Sums
 
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 
+# Bytes that begin and end no comment, string, block, definition or line.
+_PLAIN = re.compile(rb"[\w ().,:<>=+|-]*")
+
 
 class Block(Source):
     """One top-level piece of a file: a definition as a rule, or some that can't be told apart.
@@ -160,7 +163,30 @@ class Text:
         """Put ``data`` in the place of the bytes from ``start`` to ``end``."""
         start = max(0, min(start, len(self)))
         end = max(start, min(end, len(self)))
-        return self._put(start, end, data)
+        return self._plain(start, end, data) or self._put(start, end, data)
+
+    def _plain(self, start: int, end: int, data: bytes) -> Change | None:
+        """An edit that leaves the block round it as it is to its neighbours, and so needs no look at them. None for one of
+        which that isn't clear."""
+        index = self.index_at(start)
+        block, base = self.blocks[index], self._starts[index]
+        old, low, high = block.data, start - base, end - base
+        if not _PLAIN.fullmatch(data) or not low or not _PLAIN.fullmatch(old, low - 1, high + 1):
+            return None
+        # Whether the next block starts where it does is seen at the end of this one.
+        ends = len(old.rstrip())
+        if high >= ends or old[ends - 1] not in b"};" or block.shape.depth or block.shape.comment:
+            return None
+        if not block.shape.hard and not 0 <= old.find(b"{") < low:
+            return None  # it might be no block any more
+        new = old[:low] + data + old[high:]
+        pieces = split(new)
+        if len(pieces) > 1 or pieces[0].shape != block.shape:
+            return None
+        change, _ = self._exchange(index, index + 1, [(new, block.shape)])
+        if change.added:
+            _link(change, low, high, len(data))
+        return change
 
     def _put(self, start: int, end: int, data: bytes) -> Change:
         # A block's boundaries depend on its own start and on how the block before it ends; so one more block on

@@ -11,12 +11,14 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right, insort
 from collections.abc import Iterable, Sequence
-from os.path import commonprefix
 
 # From this number of candidates on, only the likeliest ones are compared: a comparison takes some 30 µs.
 MANY_NAMES = 200
 NEIGHBOURS = 8
 LIKELIEST = 8
+
+# difflib's ratio from which on two names are alike.
+CLOSE = 0.6
 
 
 class NameIndex:
@@ -54,10 +56,24 @@ def _hint(name: str, names: list[str]) -> str:
     same = next((other for other in names if other.casefold() == name.casefold()), None)
     if same is not None:
         return f"did you mean '{same}'?"
-    import difflib  # only for who mistypes
+    best = _most_like(name, names)
+    return f"did you mean '{best}'?" if best else ""
 
-    matches = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    return f"did you mean '{matches[0]}'?" if matches else ""
+
+def _most_like(name: str, names: list[str]) -> str:
+    """As difflib.get_close_matches, of which only the first is wanted: what can't be better isn't compared."""
+    from difflib import SequenceMatcher  # only for who mistypes
+
+    matcher = SequenceMatcher()
+    matcher.set_seq2(name)
+    best, ratio = "", CLOSE
+    for other in names:
+        matcher.set_seq1(other)
+        if matcher.real_quick_ratio() >= ratio and matcher.quick_ratio() >= ratio:
+            found = matcher.ratio()
+            if (found, other) >= (ratio, best):
+                best, ratio = other, found
+    return best
 
 
 def _neighbours(name: str, ordered: list[list[str]]) -> list[str]:
@@ -74,6 +90,15 @@ def _neighbours(name: str, ordered: list[list[str]]) -> list[str]:
 
 def _alike(name: str, other: str) -> int:
     """The letters that two names have in common at their heads and at their tails."""
-    head = len(commonprefix((name, other)))
-    tail = len(commonprefix((name[head:][::-1], other[head:][::-1])))
-    return head + tail
+    head = _same(name, other)
+    return head + _same(name[head:][::-1], other[head:][::-1])
+
+
+def _same(one: str, other: str) -> int:
+    """How many letters two names begin with together."""
+    count = 0
+    for a, b in zip(one, other):
+        if a != b:
+            break
+        count += 1
+    return count

@@ -11,7 +11,7 @@ from plsys.compiler.analysis.text import Text
 PIECES = [
     "\n", "\r\n", "\r", "\ufeff", "\0", "𝔸", "é", " ", "{", "}", "/*", "*/", "// x", '"', ";", "#declare A = ", "1",
     "\nSelection A\n{ A -> box; }\n", "\ncamera {\n angle 45 }\n", "\nsphere {\n", "box", "\nunion {\nbox { }\n}\n",
-    "\nTexture T {", "\f", "\u2028", "Calculation C {}",
+    "\nTexture T {", "\f", "\u2028", "Calculation C {}", "y", "Selection", " a b ", "-",
 ]  # fmt: skip
 
 texts = st.lists(st.sampled_from(PIECES), max_size=12).map("".join)
