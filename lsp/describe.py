@@ -16,12 +16,14 @@ from plsys.compiler.analysis import (
     SymbolInsight,
     ValueInsight,
     insights_of,
+    constant_of,
     motion_of,
+    stretching_of,
     syntax,
     vocabulary,
 )
 
-from . import prose
+from . import palette, prose
 
 # A definition longer than this is cut.
 MAX_LINES = 12
@@ -47,6 +49,8 @@ def describe(scene: Scene, name: str) -> str | None:
             parts.append(calculation(scene, meaning.node))
         case syntax.Transformation():
             parts.append(transformation(scene, meaning.node))
+        case syntax.Declare():
+            parts.append(constant(scene, meaning.node))
         case syntax.ParameterDeclaration():
             parts.append(declared_input(meaning.node))
         case _:
@@ -96,6 +100,15 @@ def calculation(scene: Scene, node: syntax.Calculation) -> str:
     return "\n".join(lines)
 
 
+def constant(scene: Scene, node: syntax.Declare) -> str:
+    """The number or the colour that a declared name stands for."""
+    if len(node.items) == 1 and not isinstance(node.items[0], syntax.Block | syntax.Number):
+        value = constant_of(scene, node.items[0])
+        return f"= {prose.number(value)}" if value is not None else ""
+    found = [parts for _, _, parts, _ in palette.colours_in(scene, node.items) if parts is not None]
+    return swatch(found[0]) if len(found) == 1 else ""
+
+
 def declared_input(node: syntax.ParameterDeclaration) -> str:
     parts = [node.text.value] if node.text is not None else []
     if node.low is not None and node.high is not None:
@@ -124,6 +137,8 @@ def transformation(scene: Scene, node: syntax.Transformation) -> str:
             sentence = f"At its first level it {sentence}"
         parts.append(sentence[0].upper() + sentence[1:] + ".")
         parts.append(matrix(motion))
+    elif (known := stretching_of(scene, node.statements)) is not None:
+        parts.append(f"{measures(known.determinant, known.low, known.high)}, whatever the other values are")
     reverse = povray(node.statements)
     if reverse:
         parts.append(f"The last line acts first. POV-Ray's modifiers run the other way round: `{reverse}`")
@@ -173,7 +188,12 @@ def matrix(motion: Motion) -> str:
     rows = [[prose.number(round(motion.matrix[4 * r + c], 12)) for c in range(4)] for r in range(3)]
     widths = [max(len(row[c]) for row in rows) for c in range(4)]
     lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths)) for row in rows]
-    low, high = motion.stretch
+    table = "\n".join(lines)
+    return f"```text\n{table}\n```\n\n{measures(motion.determinant, *motion.stretch)}"
+
+
+def measures(determinant: float, low: float, high: float) -> str:
+    """``determinant 0.512 · lengths ×0.8: contracts``"""
     if high < 1 - 1e-9:
         verdict = "contracts"
     elif low > 1 - 1e-9 and high < 1 + 1e-9:
@@ -181,8 +201,7 @@ def matrix(motion: Motion) -> str:
     else:
         verdict = "doesn't contract everything"
     lengths = f"lengths ×{prose.number(high)}" if high - low < 1e-9 else f"lengths ×{prose.number(low)} to ×{prose.number(high)}"
-    table = "\n".join(lines)
-    return f"```text\n{table}\n```\n\ndeterminant {prose.number(motion.determinant)} · {lengths}: {verdict}"
+    return f"determinant {prose.number(determinant)} · {lengths}: {verdict}"
 
 
 def povray(statements: tuple[syntax.Statement, ...]) -> str:

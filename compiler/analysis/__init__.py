@@ -31,7 +31,7 @@ from .folders import SUFFIX as SCENE_SUFFIX
 from .folders import Folders, Found
 from .format import Formatted, format_document, prepare_format
 from .insights import GuardInsight, Insight, SymbolInsight, ValueInsight, insights_in, insights_of
-from .motion import Motion, constant_of, motion_of
+from .motion import Motion, constant_of, motion_of, stretching_of
 from .project import Project
 from .refactor import refactorings
 from .scene import Scene
@@ -43,5 +43,5 @@ __all__ = [
     "Action", "Block", "CODES", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Folders",
     "Formatted", "Found", "GuardInsight", "Insight", "Meaning", "Message", "Motion", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
     "SCENE_SUFFIX", "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "enters_keys", "facts_of", "fix_all", "fixes",
-    "format_document", "ignoring", "insights_in", "insights_of", "line_break", "motion_of", "nearest", "prepare_format", "queries", "refactorings", "syntax", "vocabulary",
+    "format_document", "ignoring", "insights_in", "insights_of", "line_break", "motion_of", "nearest", "prepare_format", "queries", "refactorings", "stretching_of", "syntax", "vocabulary",
 ]  # fmt: skip

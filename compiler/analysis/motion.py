@@ -21,6 +21,9 @@ from .scene import Scene
 
 Vector = tuple[float, float, float]
 
+# They change no lengths.
+_RIGID = ("trans", "rotx", "roty", "rotz", "rot", "variants")
+
 
 class Motion(NamedTuple):
     """``matrix`` row by row, 3x4. ``stretch``: by how much lengths change, least and most (the singular values of the
@@ -43,6 +46,28 @@ class Motion(NamedTuple):
         m = self.matrix
         off = (m[1], m[2], m[4], m[6], m[8], m[9])
         return None if any(abs(each) > 1e-12 for each in off) else (m[0], m[5], m[10])
+
+
+class Stretching(NamedTuple):
+    """``determinant`` of a chain of operations, and bounds of the factors by which it changes lengths."""
+
+    determinant: float
+    low: float
+    high: float
+
+
+def stretching_of(scene: Scene, statements: tuple[syntax.Statement, ...]) -> Stretching | None:
+    """What is known of a Transformation whatever its angles and distances are; None if a factor isn't constant."""
+    determinant, low, high = 1.0, 1.0, 1.0
+    for statement in statements:
+        if not isinstance(statement, syntax.Operation) or statement.name.name in _RIGID:
+            continue
+        motion = motion_of(scene, (statement,))
+        if motion is None or not motion.is_constant:
+            return None
+        determinant *= motion.determinant
+        low, high = low * motion.stretch[0], high * motion.stretch[1]
+    return Stretching(determinant, low, high)
 
 
 def motion_of(scene: Scene, statements: tuple[syntax.Statement, ...]) -> Motion | None:

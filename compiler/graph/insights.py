@@ -20,8 +20,9 @@ from .insight import GuardInsight, Insights, SymbolInsight, ValueInsight
 from .lower import lower
 from .observe import Either, Entered, Item, Noted, Observer, Site, Trace, flat
 from .passes.dead import dead_parameters
-from .ranges import Range, Value
+from .ranges import Range
 from .runaway import runs_away
+from .site_values import SiteValues
 from .states import State, objects_of
 
 MAX_STATES = 20_000
@@ -216,18 +217,38 @@ class _Observation:
     def _values(self) -> Iterator[ValueInsight]:
         if self.purpose == "count":
             return  # states don't tell apart what these depend on
-        certain = not any(trace.picks for trace in (*self.roots, *self.found.formulas.values()))
-        noted: dict[tuple, _Values] = {}
+        drawn = self._drawn()
+        noted: dict[tuple, SiteValues] = {}
         first, last = self._levels()
-        traces = [(root, 0, 0) for root in self.roots]
-        traces += [(trace, first[state], last[state]) for state, trace in self.found.formulas.items()]
-        for trace, earliest, latest in traces:
-            for item in flat(trace.items):
-                if isinstance(item, Noted) and item.site.kind != "guard":
-                    noted.setdefault(item.site.key, _Values(item.site)).note(item.value, earliest, latest)
+        traces = [(root, 0, 0, False) for root in self.roots]
+        traces += [(trace, first[s], last[s], s in drawn) for s, trace in self.found.formulas.items()]
+        for trace, earliest, latest, is_drawn in traces:
+            for whole in trace.items:
+                for item in flat((whole,)):
+                    if isinstance(item, Noted) and item.site.kind != "guard":
+                        values = noted.setdefault(item.site.key, SiteValues(item.site))
+                        values.note(item.value, earliest, latest)
+                        values.drawn |= is_drawn or isinstance(whole, Either)
         for each in noted.values():
             if math.isfinite(each.low) and math.isfinite(each.high):
-                yield each.insight(certain)
+                yield each.insight()
+
+    def _drawn(self) -> set[State]:
+        """The states that are met, or met so deep, only where a draw wills it."""
+        found: set[State] = set()
+        pending = [
+            state
+            for trace in (*self.roots, *self.found.formulas.values())
+            for pick in trace.picks
+            for _, way in pick
+            for state in way.states()
+        ]
+        while pending:
+            state = pending.pop()
+            if state not in found:
+                found.add(state)
+                pending += self.found.formulas[state].states()
+        return found
 
     def _levels(self) -> tuple[dict[State, int], dict[State, int | None]]:
         """The least and the greatest depth at which each state stands; None without end."""
@@ -248,38 +269,6 @@ class _Observation:
                     known = last[entered]
                     last[entered] = None if depth is None or known is None else max(known, depth + 1)
         return first, last
-
-
-class _Values:
-    """The values noted at one site, with those of its first and its last level."""
-
-    def __init__(self, site: Site) -> None:
-        self.site = site
-        self.low, self.high, self.drawn = math.inf, -math.inf, False
-        self.earliest: float = math.inf
-        self.latest: float = -1
-        self.first: set[Value] = set()
-        self.last: set[Value] = set()
-
-    def note(self, value: Value, earliest: int, latest: int | None) -> None:
-        low, high = value if isinstance(value, Range) else (value, value)
-        self.drawn |= isinstance(value, Range)
-        self.low, self.high = min(self.low, low), max(self.high, high)
-        if earliest < self.earliest:
-            self.earliest, self.first = earliest, set()
-        if earliest == self.earliest:
-            self.first.add(value)
-        depth = math.inf if latest is None else latest
-        if depth > self.latest:
-            self.latest, self.last = depth, set()
-        if depth == self.latest:
-            self.last.add(value)
-
-    def insight(self, certain: bool) -> ValueInsight:
-        certain &= not self.drawn and len(self.first) == len(self.last) == 1
-        certain &= self.latest < math.inf or self.low == self.high
-        first, last = (next(iter(values)) if certain else math.nan for values in (self.first, self.last))
-        return ValueInsight(*self.site, first, last, self.low, self.high, certain)
 
 
 def _states(traces: Iterable[Trace]) -> dict[State, None]:

@@ -46,7 +46,7 @@ class Interval(NamedTuple):
         if self.low == self.high:
             return f"{self.low:g}"
         low = f"above {self.low:g}" if self.low_open else f"from {self.low:g}"
-        return f"{low} {'and below' if self.high_open else 'to'} {self.high:g}"
+        return f"{low} {'and below' if self.high_open else 'to'} {self.high:,.10g}"
 
 
 @dataclass(frozen=True, slots=True)

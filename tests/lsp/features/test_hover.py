@@ -76,7 +76,21 @@ def test_an_input():
 
 
 def test_a_constant():
-    assert "#declare Size = 2 * 3" in hovered("#declare Size = 2 * 3;\nsphere { 0, Si<cursor>ze }\n")
+    text = hovered("#declare Size = 2 * 3;\nsphere { 0, Si<cursor>ze }\n")
+    assert "#declare Size = 2 * 3" in text and "= 6" in text.splitlines()
+    assert "= 3" not in hovered("#declare Si<cursor>ze = 3;\n").splitlines()
+
+
+def test_a_declared_colour_has_its_swatch():
+    text = "#declare Rust = color rgb <1, 0, 0>;\n#declare Paint = pigment { color Red }\nbackground { color Ru<cursor>st }\n"
+    assert "#ff0000" in hovered(text)
+    assert "#ff0000" not in hovered(text.replace("<cursor>", "").replace("Paint", "Pai<cursor>nt"))
+
+
+def test_a_transformation_by_chance_says_what_is_sure():
+    text = hovered("Transformation T_<cursor>a { trans rand(0) 0 1; roty 30*rand(1); scale 0.8 0.7 0.5; }\n")
+    assert "determinant 0.28 · lengths ×0.5 to ×0.8: contracts, whatever the other values are" in text
+    assert "determinant" not in hovered("Transformation T_<cursor>a { roty 30; scale rand(0); }\n")
 
 
 @pytest.mark.parametrize(
