@@ -123,6 +123,9 @@ class PlStatistics(ctypes.Structure):
         *((f"front_{name}", c_uint64) for name in ("pilot_rays", "flat_bytes")),
         ("front_entries", c_double),
         ("front_pilot_seconds", c_double),
+        ("terrain_triangles", c_uint64),
+        ("terrain_bytes", c_uint64),
+        ("terrain_node_bytes", c_uint64),
     ]
 
 

@@ -186,7 +186,7 @@ static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
     const double asked = scene->options.detail;
     const bool cut = asked > 0.0, lazy = scene->accel == &pl_accel_bvh;
     const bool needed = scene->accel->states || cut;
-    if (lazy && !cut && !scene->options.front_items && pl_terrains_build(scene)) {
+    if (lazy && !cut && !scene->options.front_items && pl_terrains_build(scene, MOST_STATES)) {
         scene->accel = &pl_accel_terrain;
         return true;
     }
@@ -220,11 +220,12 @@ static bool build_structure(pl_scene *scene, pl_error *error)
 {
     pl_error why = {.code = PL_OK}, ignored;
     if (!scene->accel->build || scene->accel->build(scene, &why)) return true;
-    if (scene->accel != &pl_accel_bvh || why.code != PL_ERROR_LIMIT || strcmp(why.place, "memory") != 0) {
+    if ((scene->accel != &pl_accel_bvh && scene->accel != &pl_accel_terrain) || why.code != PL_ERROR_LIMIT ||
+        strcmp(why.place, "memory") != 0) {
         *error = why;
         return false;
     }
-    pl_fronts_destroy(scene);
+    scene->accel->destroy(scene);
     pl_states_free(&scene->states);
     scene->accel = &pl_accel_lazy;
     if (scene->accel->build(scene, &ignored)) return true;

@@ -19,6 +19,7 @@ struct pl_scene {
     pl_covers *covers; /* of the same classes */
     const pl_accel *accel;
     void *structure; /* the accelerator's */
+    struct pl_terrains *terrains; /* beside it; NULL: none */
     size_t mesh_bytes;
     pl_options options;
     size_t memory; /* bytes that states and structures may take */

@@ -307,8 +307,9 @@ class Scene:
         Of bvh: isa (None: another accelerator), front {count, items, instances: items that are one, limit: items that one
         has, None: everything; where not everything fits, pilot_rays, pilot_seconds, entries: instances that a ray is then expected to enter,
         flat_bytes: what everything would take}, instances (entered), filtered (primitives tried in single precision). bytes {program, meshes,
-        states, nodes, items} is scene_bytes by structure; seconds["states"] is a part of seconds["build"]. terrain {tiles}: where
-        the scene is a regular subdivision, there are neither states nor fronts, and items are tiles of triangles.
+        states, nodes, items} is scene_bytes by structure; seconds["states"] is a part of seconds["build"]. terrain {tiles,
+        triangles, bytes, node_bytes}: of regular subdivisions, which have neither states nor fronts; their bytes are among items
+        and nodes.
         """
         counts = PlStatistics()
         with self._open() as handle:

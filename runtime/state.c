@@ -33,6 +33,7 @@ typedef struct builder {
     pl_walk walk;
     pl_scope scope;
     pl_array items, chain, path, visits, open, members, scopes, trails, trail_counts, key;
+    uint64_t omitted; /* bit i: the i-th symbol that the scene itself enters */
     pl_error *error;
 } builder;
 
@@ -262,6 +263,7 @@ static bool add_item(builder *b, uint8_t kind, uint32_t what)
 static bool derive_items(builder *b)
 {
     const pl_program *program = b->states->program;
+    uint64_t omitted = b->visits.count ? 0 : b->omitted;
     b->items.count = 0;
     for (;;) {
         switch (pl_walk_next(&b->walk, b->error)) {
@@ -279,7 +281,9 @@ static bool derive_items(builder *b)
             b->walk.at.marks[4] |= program->nodes[b->walk.node].as.texture.code != 0;
             break;
         case PL_EVENT_ENTER:
-            if (!add_item(b, PL_NODE_ENTER, program->nodes[b->walk.node].as.enter.symbol)) return false;
+            if (omitted & 1) pl_walk_prune(&b->walk);
+            else if (!add_item(b, PL_NODE_ENTER, program->nodes[b->walk.node].as.enter.symbol)) return false;
+            omitted >>= 1;
             break;
         case PL_EVENT_PRIMITIVE:
             if (!add_item(b, PL_NODE_PRIMITIVE, b->walk.shape)) return false;
@@ -473,12 +477,18 @@ static bool explore(builder *b)
 bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree *const *meshes, bool node_boxes,
                      size_t limit, uint32_t most, pl_error *error)
 {
+    return pl_states_build_without(states, 0, program, meshes, node_boxes, limit, most, error);
+}
+
+bool pl_states_build_without(pl_states *states, uint64_t omitted, const pl_program *program, pl_mesh_tree *const *meshes,
+                             bool node_boxes, size_t limit, uint32_t most, pl_error *error)
+{
     memset(states, 0, sizeof *states);
     states->program = program;
     states->meshes = meshes;
     states->most = most ? most : UINT32_MAX;
     states->limit = limit ? limit : PL_STATES_DEFAULT_BYTES;
-    builder b = {.states = states, .error = error};
+    builder b = {.states = states, .error = error, .omitted = omitted};
     b.items.element = sizeof(pl_item);
     b.chain.element = sizeof(pl_transform *);
     b.path.element = b.trails.element = sizeof(pl_trail_node);

@@ -83,6 +83,9 @@ typedef struct pl_states {
 #define PL_STATES_DEFAULT_BYTES ((size_t)4 << 30)
 bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree *const *meshes, bool node_boxes,
                      size_t limit, uint32_t most, pl_error *error);
+/* The same without some of the symbols that the scene itself enters: the i-th one if bit i of omitted is set. */
+bool pl_states_build_without(pl_states *states, uint64_t omitted, const pl_program *program, pl_mesh_tree *const *meshes,
+                             bool node_boxes, size_t limit, uint32_t most, pl_error *error);
 void pl_states_free(pl_states *states);
 
 /* The items as they were before packing, for those who still point at them. */

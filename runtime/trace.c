@@ -87,6 +87,7 @@ uint64_t pl_trace_primitive(pl_tracer *tracer, const pl_hit *hit)
         return pl_states_locate(&scene->states, &hit->path, hit->cut_depth);
     if (!scene->accel->items) return hit->primitive;
     if (!scene->accel->items(scene, &hit->trail, &tracer->items)) return UINT64_MAX;
+    if (!tracer->items.count) return hit->primitive;
     for (size_t i = 0; i < tracer->items.count; i++)
         primitive = pl_add_saturating(primitive, tracer->items.list[i]->first);
     return primitive;

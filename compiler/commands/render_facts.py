@@ -83,17 +83,18 @@ def _built(statistics: dict) -> list[tuple[str, int, str]]:
         rows.append(("meshes", size["meshes"], "boxes over triangles"))
     if size["states"]:
         rows.append(("states", size["states"], f"{statistics['states']} in {seconds['states']:.4f} s"))
-    tiles = statistics["terrain"]["tiles"]
-    if tiles:
-        each = (size["items"] + size["nodes"]) / statistics["primitives"]
-        rows.append(("terrain tiles", size["items"], f"{tiles:,}, of {statistics['primitives']:,} triangles, {each:.1f} bytes each"))
-        rows.append(("terrain nodes", size["nodes"], f"above them, all in {seconds['build']:.4f} s; {statistics['isa']}"))
+    terrain = statistics["terrain"]
+    if terrain["tiles"]:
+        each = (terrain["bytes"] + terrain["node_bytes"]) / terrain["triangles"]
+        text = f"{terrain['tiles']:,}, of {terrain['triangles']:,} triangles, {each:.1f} bytes each"
+        rows.append(("terrain tiles", terrain["bytes"], text))
+        rows.append(("terrain nodes", terrain["node_bytes"], f"above them, all in {seconds['build']:.4f} s; {statistics['isa']}"))
     if front["count"]:
         limit = "any number" if front["limit"] is None else f"at most {front['limit']:,}"
         build = seconds["build"] - seconds["states"]
-        rows.append(("front items", size["items"], f"{front['items']:,}, {front['instances']:,} of them instances"))
+        rows.append(("front items", size["items"] - terrain["bytes"], f"{front['items']:,}, {front['instances']:,} of them instances"))
         rows.append(
-            ("front nodes", size["nodes"], f"of {front['count']:,} fronts with {limit} items each, in {build:.4f} s; {statistics['isa']}")
+            ("front nodes", size["nodes"] - terrain["node_bytes"], f"of {front['count']:,} fronts with {limit} items each, in {build:.4f} s; {statistics['isa']}")
         )
     return rows
 

@@ -97,9 +97,9 @@ struct pl_accel {
     /* Of up to PL_TRACE_MANY rays: whether they go well together, and tracing them so. NULL: one by one. */
     bool (*is_packet)(const pl_tracer *tracer, const pl_ray *rays, unsigned count);
     bool (*trace_packet)(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
-    /* The items from the scene's to the leaf's at a trail; NULL: its hits have paths. false: no memory. */
+    /* The items from the scene's to the leaf's at a trail; none: there is a path. NULL: its hits have paths. false: no memory. */
     bool (*items)(const pl_scene *scene, const pl_path *trail, pl_items *items);
-    /* Where trails lead to no items: the path in union terms at one. false: no memory. */
+    /* The path in union terms at a trail that has no items. false: no memory. */
     bool (*path)(const pl_scene *scene, const pl_path *trail, pl_path *path);
     /* A walk that follows such a path to its leaf stands at an enter node: it may be moved to a later one. What isn't known
      * there has no value, so that whoever reads it gets an error and walks the whole path. NULL: it never is. */

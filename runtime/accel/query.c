@@ -27,10 +27,10 @@ bool pl_items_path(const pl_items *items, pl_path *path)
 
 static bool trail_path(const pl_query *query, const pl_path *trail, pl_path *path)
 {
-    const pl_accel *accel = query->tracer->scene->accel;
-    if (accel->path) return accel->path(query->tracer->scene, trail, path);
-    return accel->items(query->tracer->scene, trail, &query->tracer->items) &&
-           pl_items_path(&query->tracer->items, path);
+    const pl_scene *scene = query->tracer->scene;
+    pl_items *items = &query->tracer->items;
+    if (!scene->accel->items(scene, trail, items)) return false;
+    return items->count ? pl_items_path(items, path) : scene->accel->path(scene, trail, path);
 }
 
 /* A leaf's path in union terms; where it has a trail, that too. */

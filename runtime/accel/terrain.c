@@ -9,16 +9,19 @@
 
 /* --- hits --- */
 
-/* A trail: the number of a terrain or, after these, of a single shape; and a triangle's. */
+/* A trail: the number of a terrain or, after these, of a single shape; and a triangle's. The kind tells them from trails of
+ * fronts. */
 typedef struct source {
     uint32_t place, leaf;
 } source;
+
+enum { KIND_PLACE = 15 };
 
 static bool write_trail(const void *context, pl_path *trail)
 {
     const source *s = context;
     if (trail->capacity < 2 && !pl_path_push(trail, 1, 0)) return false;
-    trail->terms[0] = s->place;
+    trail->terms[0] = pl_ref_of(KIND_PLACE, s->place);
     trail->terms[1] = s->leaf;
     trail->length = 2;
     return true;
@@ -36,8 +39,8 @@ static bool write_terms(const pl_terrain_place *place, uint32_t more, pl_path *p
 /* A triangle's number tells the terms. */
 static bool trail_path(const pl_scene *scene, const pl_path *trail, pl_path *path)
 {
-    const pl_terrains *terrains = scene->structure;
-    const uint32_t place = trail->terms[0];
+    const pl_terrains *terrains = scene->terrains;
+    const uint32_t place = trail->terms[0] & PL_REF_INDEX;
     if (place >= terrains->count) return write_terms(&terrains->singles[place - terrains->count].place, 0, path);
     const pl_terrain *terrain = &terrains->list[place];
     if (!write_terms(&terrain->place, terrain->levels, path)) return false;
@@ -52,8 +55,16 @@ static bool trail_path(const pl_scene *scene, const pl_path *trail, pl_path *pat
 
 static void skip(const pl_scene *scene, const pl_path *trail, pl_walk *walk)
 {
-    const pl_terrains *terrains = scene->structure;
-    if (trail->terms[0] < terrains->count) pl_terrain_end_skip(&terrains->list[trail->terms[0]], trail->terms[1], walk);
+    const pl_terrains *terrains = scene->terrains;
+    const uint32_t place = trail->terms[0] & PL_REF_INDEX;
+    if (place < terrains->count) pl_terrain_end_skip(&terrains->list[place], trail->terms[1], walk);
+}
+
+static bool trail_items(const pl_scene *scene, const pl_path *trail, pl_items *items)
+{
+    if (trail->terms[0] >> PL_REF_SHIFT != KIND_PLACE) return pl_accel_bvh.items(scene, trail, items);
+    items->count = 0;
+    return true;
 }
 
 bool pl_terrain_candidate(pl_tracer *tracer, const pl_terrain *terrain, uint64_t tile, uint32_t leaf, const double o[3],
@@ -70,7 +81,7 @@ bool pl_terrain_candidate(pl_tracer *tracer, const pl_terrain *terrain, uint64_t
     memcpy(mapped_o, o, sizeof mapped_o);
     memcpy(mapped_d, d, sizeof mapped_d);
     pl_map_ray(&transform, mapped_o, mapped_d);
-    const pl_terrains *terrains = tracer->scene->structure;
+    const pl_terrains *terrains = tracer->scene->terrains;
     source s = {(uint32_t)(terrain - terrains->list), (uint32_t)(tile * terrain->tile_leaves) + leaf};
     pl_leaf candidate = {.shape = PL_SHAPE_TRIANGLE,
                          .arguments = no_arguments,
@@ -114,7 +125,7 @@ static bool trace_singles(pl_tracer *tracer, const pl_terrains *terrains, const 
 
 static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
 {
-    const pl_terrains *terrains = tracer->scene->structure;
+    const pl_terrains *terrains = tracer->scene->terrains;
     pl_terrain_kernel *kernel = pl_terrain_trace_scalar;
     double o[3], d[3];
 #ifdef __x86_64__
@@ -128,7 +139,7 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
         map_to_place(&terrain->place, ray, o, d);
         if (!kernel(tracer, terrain, o, d, query)) return false;
     }
-    return true;
+    return !terrains->fronts || query->done || pl_accel_bvh.trace(tracer, ray, query);
 }
 
 /* Those that don't go well together gain as well: they needn't wait for memory one after another. */
@@ -141,7 +152,7 @@ static bool is_packet(const pl_tracer *tracer, const pl_ray *rays, unsigned coun
 static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
 {
 #ifdef __x86_64__
-    const pl_terrains *terrains = tracer->scene->structure;
+    const pl_terrains *terrains = tracer->scene->terrains;
     pl_terrain_packet *kernel = tracer->scene->isa == PL_ISA_AVX512 ? pl_terrain_packet_avx512 : pl_terrain_packet_avx2;
     pl_ray mapped[PL_LANES];
     for (unsigned k = 0; k < count; k++)
@@ -152,6 +163,10 @@ static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, pl_query *querie
         for (unsigned k = 0; k < count; k++) map_to_place(&terrain->place, &rays[k], mapped[k].origin, mapped[k].direction);
         if (!kernel(tracer, terrain, mapped, queries, count)) return false;
     }
+    if (!terrains->fronts) return true;
+    if (pl_accel_bvh.is_packet(tracer, rays, count)) return pl_accel_bvh.trace_packet(tracer, rays, queries, count);
+    for (unsigned k = 0; k < count; k++)
+        if (!pl_accel_bvh.trace(tracer, &rays[k], &queries[k])) return false;
     return true;
 #else
     (void)tracer, (void)rays, (void)queries, (void)count;
@@ -171,53 +186,50 @@ static void work_destroy(void *work)
     pl_accel_bvh.work_destroy(work);
 }
 
-static void free_place(pl_terrain_place *place)
+/* Fronts of what isn't terrain, in the memory that terrains leave. */
+static bool build(pl_scene *scene, pl_error *error)
 {
-    free(place->transforms);
-    free(place->terms);
-}
-
-void pl_terrains_free(pl_terrains *terrains)
-{
-    if (!terrains) return;
-    for (uint32_t i = 0; terrains->list && i < terrains->count; i++) {
-        pl_terrain *terrain = &terrains->list[i];
-        free_place(&terrain->place);
-        free(terrain->scope);
-        free(terrain->classes);
-        free(terrain->end.cells);
-        free(terrain->end.values);
-        free(terrain->memory);
-        free((void *)terrain->front.nodes);
-    }
-    for (uint32_t i = 0; terrains->singles && i < terrains->single_count; i++) free_place(&terrains->singles[i].place);
-    free(terrains->list);
-    free(terrains->singles);
-    free(terrains);
+    const size_t asked = scene->options.memory, taken = scene->terrains->bytes;
+    if (!scene->terrains->fronts) return true;
+    if (asked) scene->options.memory = asked > taken ? asked - taken : 1;
+    const bool ok = pl_fronts_build(scene, error);
+    scene->options.memory = asked;
+    return ok;
 }
 
 static void destroy(pl_scene *scene)
 {
-    pl_terrains_free(scene->structure);
-    scene->structure = NULL;
+    pl_fronts_destroy(scene);
+    pl_terrains_free(scene);
 }
 
 void pl_terrains_count(const pl_scene *scene, pl_statistics *counts)
 {
-    const pl_terrains *terrains = scene->structure;
-    counts->primitives = terrains->generated;
-    counts->depth = 0;
+    const pl_terrains *terrains = scene->terrains;
+    if (terrains->fronts) pl_fronts_count(scene, counts);
+    else counts->primitives = counts->depth = 0;
+    counts->primitives = pl_add_saturating(counts->primitives, terrains->generated);
     for (uint32_t i = 0; i < terrains->count; i++) {
         const pl_terrain *terrain = &terrains->list[i];
         counts->depth = terrain->depth > counts->depth ? terrain->depth : counts->depth;
-        counts->bytes_nodes += terrain->node_bytes;
         counts->terrain_tiles += terrain->tiles;
+        counts->terrain_triangles += terrain->leaves;
+        counts->terrain_node_bytes += terrain->node_bytes;
     }
-    counts->bytes_items = terrains->bytes - counts->bytes_nodes;
+    counts->terrain_bytes = terrains->bytes - counts->terrain_node_bytes;
+    counts->bytes_nodes += counts->terrain_node_bytes;
+    counts->bytes_items += counts->terrain_bytes;
     counts->isa = scene->isa;
 }
 
-const pl_accel pl_accel_terrain = {
-    .name = "bvh", .destroy = destroy, .work_create = work_create, .work_destroy = work_destroy, .trace = trace,
-    .is_packet = is_packet, .trace_packet = trace_packet,
-    .path = trail_path, .skip = skip};
+const pl_accel pl_accel_terrain = {.name = "bvh",
+                                   .build = build,
+                                   .destroy = destroy,
+                                   .work_create = work_create,
+                                   .work_destroy = work_destroy,
+                                   .trace = trace,
+                                   .is_packet = is_packet,
+                                   .trace_packet = trace_packet,
+                                   .items = trail_items,
+                                   .path = trail_path,
+                                   .skip = skip};

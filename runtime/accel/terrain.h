@@ -9,6 +9,8 @@
  *     cluster  eight triangles that follow one another; a tile has their boxes and corners in 8 bits a coordinate, to filter
  *     front    a tree of boxes over the tiles, as front.h has it
  *
+ * What else a scene has is in fronts of its own (bvh.c), and rays go through both.
+ *
  * A matrix made from a tile's values has the bits that the derivation gives it: every triangle was compared when the tiles
  * were filled. So hits are normative and nothing is derived while tracing.
  *
@@ -78,6 +80,7 @@ typedef struct pl_terrain_end {
 
 typedef struct pl_terrain {
     pl_terrain_place place;
+    uint32_t entered; /* symbols that the scene enters before its own */
     uint32_t symbol;
     uint64_t *scope; /* packed, on the way into the symbol */
     uint32_t levels, radix[PL_TERRAIN_LEVELS]; /* terms of each union on the way down */
@@ -106,10 +109,12 @@ typedef struct pl_terrain_single {
     double arguments[PL_SHAPE_ARGUMENTS];
 } pl_terrain_single;
 
+/* Where the scene has other symbols as well, or many single shapes, fronts have all but the terrains. */
 typedef struct pl_terrains {
     pl_terrain *list;
-    pl_terrain_single *singles;
+    pl_terrain_single *singles; /* none where there are fronts */
     uint32_t count, single_count;
+    bool fronts;
     uint64_t generated;
     size_t bytes;
 } pl_terrains;
@@ -171,8 +176,10 @@ typedef bool pl_terrain_take(void *context, uint64_t leaf, const double *cells, 
 bool pl_terrain_derive(const pl_terrain *terrain, pl_terrain_walk *w, uint32_t level, uint64_t index,
                        pl_terrain_take *take, void *context);
 
-/* Whether the scene is terrains and a few single shapes, which pay; then it has scene->structure. */
-bool pl_terrains_build(pl_scene *scene);
+/* Whether the scene has terrains that pay; then it has scene->terrains, and states of what else there is, of which there are
+ * no more than most. */
+bool pl_terrains_build(pl_scene *scene, uint32_t most);
+void pl_terrains_free(pl_scene *scene);
 
 /* --- terrain_end.c --- */
 
@@ -206,7 +213,6 @@ bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit);
 
 /* --- terrain.c --- */
 
-void pl_terrains_free(pl_terrains *terrains);
 void pl_terrains_count(const pl_scene *scene, pl_statistics *counts);
 
 typedef bool pl_terrain_kernel(pl_tracer *tracer, const pl_terrain *terrain, const double o[3], const double d[3],

@@ -292,6 +292,35 @@ static bool read_shape(pl_terrain *terrain, pl_terrain_walk *w)
 
 /* --- the scene --- */
 
+static void free_place(pl_terrain_place *place)
+{
+    free(place->transforms);
+    free(place->terms);
+}
+
+static void free_terrain(pl_terrain *terrain)
+{
+    free_place(&terrain->place);
+    free(terrain->scope);
+    free(terrain->classes);
+    free(terrain->end.cells);
+    free(terrain->end.values);
+    free(terrain->memory);
+    free((void *)terrain->front.nodes);
+}
+
+void pl_terrains_free(pl_scene *scene)
+{
+    pl_terrains *terrains = scene->terrains;
+    scene->terrains = NULL;
+    if (!terrains) return;
+    for (uint32_t i = 0; terrains->list && i < terrains->count; i++) free_terrain(&terrains->list[i]);
+    for (uint32_t i = 0; terrains->singles && i < terrains->single_count; i++) free_place(&terrains->singles[i].place);
+    free(terrains->list);
+    free(terrains->singles);
+    free(terrains);
+}
+
 static bool set_place(pl_terrain_place *place, const pl_walk *walk, const pl_transform *chain, uint64_t first)
 {
     place->transform_count = walk->at.marks[0];
@@ -317,7 +346,7 @@ static bool add_single(const pl_scene *scene, pl_terrains *terrains, const pl_wa
     return set_place(&single->place, walk, chain, first);
 }
 
-/* The terrain of the symbol that the walk is about to enter. */
+/* The terrain of the symbol that the walk is about to enter; false: it isn't one. */
 static bool add_terrain(const pl_scene *scene, pl_terrains *terrains, const pl_walk *walk, const pl_transform *chain,
                         uint64_t first)
 {
@@ -327,21 +356,30 @@ static bool add_terrain(const pl_scene *scene, pl_terrains *terrains, const pl_w
     pl_terrain *terrain = &terrains->list[terrains->count++];
     terrain->symbol = program->nodes[walk->node].as.enter.symbol;
     terrain->scope = malloc(pl_scope_words(program, &walk->scope) * sizeof *terrain->scope);
-    if (!terrain->scope || !set_place(&terrain->place, walk, chain, first)) return false;
-    pl_scope_pack(program, &walk->scope, terrain->scope);
-    bool ok = pl_terrain_walk_begin(&w, program) && read_shape(terrain, &w);
-    pl_terrain_walk_end(&w);
-    terrains->generated += terrain->leaves;
-    return ok && terrains->generated <= PL_TERRAIN_MOST;
+    bool ok = terrain->scope && set_place(&terrain->place, walk, chain, first);
+    if (ok) {
+        pl_scope_pack(program, &walk->scope, terrain->scope);
+        ok = pl_terrain_walk_begin(&w, program) && read_shape(terrain, &w) &&
+             terrains->generated + terrain->leaves <= PL_TERRAIN_MOST;
+        pl_terrain_walk_end(&w);
+    }
+    if (ok) {
+        terrains->generated += terrain->leaves;
+        return true;
+    }
+    free_terrain(terrain);
+    *terrain = (pl_terrain){0};
+    terrains->count--;
+    return false;
 }
 
 /* Lists what stands at the scene's root. */
 static bool list_places(const pl_scene *scene, pl_terrains *terrains, pl_walk *walk)
 {
-    enum { MOST_TRANSFORMS = 64 };
+    enum { MOST_TRANSFORMS = 64, MOST_ENTERED = 64 /* bits of those that states are built without */ };
     pl_transform chain[MOST_TRANSFORMS];
     uint64_t first = 0;
-    for (;;) {
+    for (uint32_t entered = 0;;) {
         switch (pl_walk_next(walk, NULL)) {
         case PL_EVENT_END: return terrains->count > 0;
         case PL_EVENT_TEXTURE: break;
@@ -350,14 +388,19 @@ static bool list_places(const pl_scene *scene, pl_terrains *terrains, pl_walk *w
             chain[walk->at.marks[0]++] = *walk->transform;
             break;
         case PL_EVENT_PRIMITIVE:
-            if (!add_single(scene, terrains, walk, false, chain, first++)) return false;
+            terrains->fronts = !add_single(scene, terrains, walk, false, chain, first++) || terrains->fronts;
             break;
         case PL_EVENT_MESH:
-            if (!add_single(scene, terrains, walk, true, chain, first++)) return false;
+            terrains->fronts = !add_single(scene, terrains, walk, true, chain, first++) || terrains->fronts;
             break;
         case PL_EVENT_ENTER:
-            if (!add_terrain(scene, terrains, walk, chain, first)) return false;
-            first += terrains->list[terrains->count - 1].leaves;
+            if (entered < MOST_ENTERED && add_terrain(scene, terrains, walk, chain, first)) {
+                terrains->list[terrains->count - 1].entered = entered;
+                first += terrains->list[terrains->count - 1].leaves;
+            } else {
+                terrains->fronts = true;
+            }
+            entered++;
             pl_walk_prune(walk);
             break;
         default: return false;
@@ -365,9 +408,47 @@ static bool list_places(const pl_scene *scene, pl_terrains *terrains, pl_walk *w
     }
 }
 
+/* -1, 0 or 1: the order in which an item of the scene and a terrain stand there. */
+static int compare_places(const pl_item *item, const pl_terrain_place *place)
+{
+    const pl_path a = {(uint32_t *)item->terms, item->term_count, 0}, b = {place->terms, place->term_count, 0};
+    return pl_path_compare(&a, &b);
+}
+
+/* Primitives are counted through: items come after the terrains before them, and terrains after such items. */
+static void number(pl_scene *scene, pl_terrains *terrains)
+{
+    const pl_state *root = &scene->states.list[0];
+    for (uint32_t i = 0, k = 0; i < terrains->count; i++) {
+        uint64_t first = 0;
+        for (k = 0; k < root->item_count && compare_places(&root->items[k], &terrains->list[i].place) < 0; k++)
+            first = pl_add_saturating(first, pl_item_primitives(&scene->states, &root->items[k]));
+        for (uint32_t before = 0; before < i; before++) first = pl_add_saturating(first, terrains->list[before].leaves);
+        terrains->list[i].place.first = first;
+        for (; k < root->item_count; k++) {
+            pl_item *item = (pl_item *)&root->items[k];
+            item->first = pl_add_saturating(item->first, terrains->list[i].leaves);
+        }
+    }
+}
+
+/* States of what isn't terrain. false: there are too many, or they have no end. */
+static bool build_states(pl_scene *scene, pl_terrains *terrains, uint32_t most)
+{
+    uint64_t omitted = 0;
+    pl_error ignored;
+    for (uint32_t i = 0; i < terrains->single_count; i++) free_place(&terrains->singles[i].place);
+    terrains->single_count = 0;
+    for (uint32_t i = 0; i < terrains->count; i++) omitted |= UINT64_C(1) << terrains->list[i].entered;
+    if (!pl_states_build_without(&scene->states, omitted, scene->program, scene->meshes, false, scene->memory, most, &ignored))
+        return false;
+    number(scene, terrains);
+    return !scene->states.list[0].endless;
+}
+
 static bool fill_all(const pl_scene *scene, pl_terrains *terrains)
 {
-    size_t used = scene->program->bytes + scene->mesh_bytes;
+    size_t used = scene->program->bytes + scene->mesh_bytes + scene->states.bytes;
     terrains->bytes = sizeof *terrains + MOST_PLACES * (sizeof *terrains->list + sizeof *terrains->singles);
     for (uint32_t i = 0; i < terrains->count; i++) {
         pl_terrain *terrain = &terrains->list[i];
@@ -380,7 +461,7 @@ static bool fill_all(const pl_scene *scene, pl_terrains *terrains)
     return true;
 }
 
-bool pl_terrains_build(pl_scene *scene)
+bool pl_terrains_build(pl_scene *scene, uint32_t most)
 {
     if (!has_form(scene->program)) return false;
     pl_terrains *terrains = calloc(1, sizeof *terrains);
@@ -391,7 +472,10 @@ bool pl_terrains_build(pl_scene *scene)
         ok = list_places(scene, terrains, &walk) && walk.singular == 0;
         pl_walk_end(&walk);
     }
-    if (ok && (ok = fill_all(scene, terrains))) scene->structure = terrains;
-    else pl_terrains_free(terrains);
-    return ok;
+    ok = ok && (!terrains->fronts || build_states(scene, terrains, most)) && fill_all(scene, terrains);
+    scene->terrains = terrains;
+    if (ok) return true;
+    pl_terrains_free(scene);
+    pl_states_free(&scene->states);
+    return false;
 }

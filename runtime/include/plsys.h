@@ -150,6 +150,7 @@ typedef struct pl_statistics {
      * opened would take. pilot_seconds is a part of seconds_build, 0: no pilot. */
     uint64_t front_pilot_rays, front_flat_bytes;
     double front_entries, front_pilot_seconds;
+    uint64_t terrain_triangles, terrain_bytes, terrain_node_bytes; /* in the tiles; of bytes_items and bytes_nodes */
 } pl_statistics;
 
 PL_API void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics);

@@ -217,3 +217,71 @@ def test_what_is_no_regular_subdivision_is_not_taken_for_one(what):
     assert_same(
         answers(data, origins, targets - origins), answers(data, origins, targets - origins, accelerator="none"), what
     )
+
+
+# Beside hills: trees on them, found by the same subdivision, more hills after these, and shapes.
+WOODED = (
+    SCENE.read_text().replace("object { Hills }", """
+sphere { <20, 20, 4>, 3 }
+object { Woods }
+object { Hills texture { pigment { color rgb 1 } } no_shadow }
+object { Woods translate <3, 2, 4> }
+object { Hills scale <0.5, 0.5, 0.2> translate <-20, 10, 0> }
+box { <30, 5, 0>, <34, 9, 6> texture { pigment { color rgb <1, 0, 0> } } }
+""")
+    + """
+Selection Woods { Woods -> Wood(2, relief, 0, 0, -3, 64, 0, -3, 64, 64, 8) + Wood(2, relief, 64, 64, 8, 0, 64, 1, 0, 0, -3); }
+Selection Wood(n, rough, xa, ya, za, xb, yb, zb, xc, yc, zc)
+{
+    if (n > 0)
+        Wood -> C_middles ( Wood(n - 1, rough / 2, xa, ya, za, xab, yab, zab, xca, yca, zca)
+                          + Wood(n - 1, rough / 2, xab, yab, zab, xb, yb, zb, xbc, ybc, zbc)
+                          + Wood(n - 1, rough / 2, xca, yca, zca, xbc, ybc, zbc, xc, yc, zc) );
+    else
+        Wood -> [ trans xa ya za ] Tree(4);
+}
+Selection Tree(k)
+{
+    if (k > 0) Tree -> Bark [ scale 0.3 0.3 3 ] cylinder + [ trans 0 0 3; roty 35; scale 0.75 ] Tree(k - 1) + [ trans 0 0 3; roty -35; rotz 80; scale 0.7 ] Tree(k - 1);
+    else       Tree -> sphere;
+}
+Texture Bark { pigment { color rgb <0.4, 0.3, k/4> } }
+"""
+)  # fmt: skip
+
+
+def test_trees_stand_on_hills():
+    data = compile(WOODED, parameters={"level": 4})
+    with Scene(data) as scene:
+        statistics = scene.statistics
+        assert statistics["terrain"]["tiles"] == 16 and statistics["front"]["count"] and not statistics["lazy"]["unfolded"]
+    assert statistics["terrain"]["triangles"] == 2 * 2 * 4**4
+    with Scene(data, accelerator="boxes") as scene:
+        assert scene.statistics["primitives"] == statistics["primitives"] and scene.statistics["depth"] == statistics["depth"]
+        expected = scene.render(60, 45, channels=("color", "primitive", "symbol", "rule", "normal", "recursion"))
+    origins, directions = (np.concatenate(pair) for pair in zip(rays(data, 400), bundles(data, 2)))
+    hits = answers(data, origins, directions, accelerator="none")
+    for isa in available(data):
+        assert_same(answers(data, origins, directions, isa=isa), hits, isa)
+        with Scene(data, isa=isa) as scene:
+            found = scene.render(60, 45, channels=("color", "primitive", "symbol", "rule", "normal", "recursion"))
+        for channel, values in expected.items():
+            np.testing.assert_array_equal(found[channel], values, channel)
+
+
+@pytest.mark.parametrize("memory", [50, 70, 100, 200, 1000])
+def test_trees_on_hills_in_little_memory(memory):
+    data = compile(WOODED, parameters={"level": 4})
+    origins, directions = rays(data, 60)
+    expected = answers(data, origins, directions, accelerator="boxes")
+    with Scene(data, memory=memory * 1024) as scene:
+        size = scene.statistics["bytes"]
+        assert size["states"] + size["nodes"] + size["items"] <= memory * 1024
+    assert_same(answers(data, origins, directions, memory=memory * 1024), expected, memory)
+
+
+def test_what_has_too_many_states_beside_hills_is_unfolded_on_touch():
+    text = WOODED.replace("Wood(2,", "Wood(12,").replace("object { Woods translate <3, 2, 4> }", "")
+    data = compile(text, parameters={"level": 4})
+    with Scene(data) as scene:
+        assert scene.statistics["terrain"]["tiles"] == scene.statistics["front"]["count"] == 0
