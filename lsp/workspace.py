@@ -134,7 +134,8 @@ class Workspace:
 
     def uri_of(self, path: Path) -> str:
         """The URI of a path: the client's own where the file is open."""
-        return next((uri for document, uri in self.uris.items() if document.path == path), None) or uri_of(path)
+        document = self.project.known(path)
+        return self.uri(document) if document is not None else uri_of(path)
 
     def positions(self, document: Document) -> Positions:
         return Positions(document.text, self.encoding)
@@ -153,7 +154,37 @@ class Workspace:
         scene = self.scene(document)
         messages = scene.messages(document)[:MAX_DIAGNOSTICS]
         positions = self.positions(document)
-        return [self._diagnostic(scene, positions, message) for message in messages]
+        found = [self._diagnostic(scene, positions, message) for message in messages]
+        return [*found, *self._in_included_files(scene, document)] if len(scene.documents) > 1 else found
+
+    def _in_included_files(self, scene: Scene, document: Document) -> Iterator[dict]:
+        """At each #include: the errors of files that it leads to and that nobody would see, since they aren't open."""
+        for place, path in document.included_paths():
+            waiting, seen = [self.project.known(path)], {document}
+            errors: list[tuple[Document, Message]] = []
+            while waiting:
+                included = waiting.pop(0)
+                if included is None or included in seen or included not in scene.documents or included.version is not None:
+                    continue
+                seen.add(included)
+                errors += [(included, each) for each in scene.messages(included) if each.diagnostic.severity == "error"]
+                waiting += [self.project.known(other) for _, other in included.included_paths()]
+            if errors:
+                yield self._include_with_errors(place, errors)
+
+    def _include_with_errors(self, place: Place, errors: list[tuple[Document, Message]]) -> dict:
+        included, first = errors[0]
+        where = self.location(Place(included, first.start, first.end))
+        count = "an error" if len(errors) == 1 else f"{len(errors)} errors, the first"
+        line = where["range"]["start"]["line"] + 1
+        return {
+            "range": self.range(place),
+            "severity": SEVERITY["error"],
+            "code": "include",
+            "source": "plsys",
+            "message": f"'{Path(included.text.name).name}' has {count} in line {line}: {first.diagnostic.message}",
+            "relatedInformation": [{"location": where, "message": first.diagnostic.message}],
+        }
 
     def _diagnostic(self, scene: Scene, positions: Positions, message: Message) -> dict:
         found = message.diagnostic
@@ -191,5 +222,8 @@ def path_of(uri: str) -> Path | None:
 def uri_of(path: Path | None) -> str:
     if path is None:
         return "untitled:"
-    text = path.absolute().as_posix()
+    written = path.absolute()
+    plain = Path(os.path.normpath(written))
+    # Behind a symbolic link `..` leads elsewhere than the text says.
+    text = (plain if ".." not in written.parts or os.path.realpath(plain) == os.path.realpath(written) else written.resolve()).as_posix()
     return "file://" + quote(text if text.startswith("/") else "/" + text)

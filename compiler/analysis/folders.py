@@ -195,11 +195,11 @@ class Folders:
 
     # --- asking
 
-    def scenes_above(self, path: Path) -> list[Path]:
-        """The files that nobody includes and that lead to ``path`` by includes; at most MAX_SCENES."""
+    def scenes_above(self, path: Path, limit: int | None = MAX_SCENES) -> list[Path]:
+        """The files that nobody includes and that lead to ``path`` by includes; at most ``limit``."""
         start = identity(path)
         found, seen, queue = [], {start}, [start]
-        while queue and len(found) < MAX_SCENES:
+        while queue and (limit is None or len(found) < limit):
             above = self._including.get(queue.pop(0), {})
             for each in above:
                 if each not in seen:
@@ -207,7 +207,7 @@ class Folders:
                     queue.append(each)
                     if not self._including.get(each):
                         found.append(each)
-        return found[:MAX_SCENES]
+        return found[:limit]
 
 
 def main() -> None:

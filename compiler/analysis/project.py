@@ -24,9 +24,10 @@ from .text import Change
 
 
 class Project:
-    """``scenes_above`` gives the files, open or not, whose scenes a file is part of (folders.py)."""
+    """``scenes_above`` gives the files, open or not, whose scenes a file is part of (folders.py); with None as its limit,
+    all of them."""
 
-    def __init__(self, scenes_above: Callable[[Path], Iterable[Path]] = lambda path: ()) -> None:
+    def __init__(self, scenes_above: Callable[..., Iterable[Path]] = lambda path, limit=0: ()) -> None:
         self.documents: dict[Path | str, Document] = {}
         self.scenes: dict[Document, Scene] = {}
         self.scenes_above = scenes_above
@@ -42,6 +43,10 @@ class Project:
                 raise FileNotFoundError(2, "No such file or directory")
             found = self.documents[key] = Document(path, path.read_bytes())
         return found
+
+    def known(self, path: Path) -> Document | None:
+        """The document of ``path``, if it has been opened or read."""
+        return self.documents.get(_key(path))
 
     def open(self, path: Path | None, data: bytes, version: int | None = 0, name: str = "") -> Document:
         """The editor opened ``path`` with the text ``data``, which now counts instead of the file. A text without a
@@ -115,8 +120,8 @@ class Project:
             if document.version is None and document not in needed:
                 del self.documents[key]
 
-    def _open_scenes_above(self, document: Document) -> None:
-        for path in self.scenes_above(document.path) if document.path is not None else ():
+    def _open_scenes_above(self, document: Document, **limit: None) -> None:
+        for path in self.scenes_above(document.path, **limit) if document.path is not None else ():
             try:
                 root = self.document(path)
             except OSError:
@@ -139,12 +144,14 @@ class Project:
             document.scenes.remove(scene)
 
     def scenes_with(self, name: str, document: Document) -> Iterator[Scene]:
-        """The scenes in which ``name`` means what it does in ``document``: those that share a file that has it. All that
-        edits touched in them is read."""
+        """The scenes in which ``name`` means what it does in ``document``: those that share a file that has it, open or
+        not. All that edits touched in them is read."""
         seen: list[Scene] = []
         waiting, looked_at = [document], {document}
         while waiting:
-            for scene in waiting.pop().scenes:
+            found = waiting.pop()
+            self._open_scenes_above(found, limit=None)
+            for scene in list(found.scenes):
                 if scene not in seen:
                     seen.append(scene)
                     scene.work()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from plsys.compiler.analysis import Folders
 from tests.lsp.client import Client
-from tests.lsp.editor import Editor
+from tests.lsp.editor import Editor, Refusal
 
 LIBRARY = "#declare Bark = rgb <0.4, 0.3, 0.2>;\nTransformation T_up { trans 0 0 1; }\n"
 OAK = '#include "lib.plsys"\nSelection Oak { Oak -> T_up cylinder; }\nobject { Oak pigment { Bark } }\n'
@@ -51,6 +51,32 @@ def test_references_and_rename_reach_the_scenes_that_include_the_file(folder):
     assert {uri.rpartition("/")[2]: len(each) for uri, each in edits.items()} == {
         "lib.plsys": 1, "ash.plsys": 1, "oak.plsys": 1,
     }  # fmt: skip
+
+
+def test_rename_reaches_scenes_whose_library_is_not_open(folder):
+    """Renaming from a scene: the library is edited on disk, and so are all others that include it, by whatever path."""
+    below = folder / "more"
+    below.mkdir()
+    for i in range(12):
+        (below / f"elm{i}.plsys").write_text(OAK.replace("Oak", "Elm").replace("lib", "../more/../lib"))
+    editor = Editor({"oak.plsys": OAK.replace("T_up", "T_<cursor>up")}, folder=folder, roots=(folder,))
+    edits = editor.at_cursor("textDocument/rename", newName="T_raise")["changes"]
+    assert {uri.removeprefix(folder.as_uri()) for uri in edits} == {
+        "/lib.plsys", "/ash.plsys", "/oak.plsys", *(f"/more/elm{i}.plsys" for i in range(12)),
+    }  # fmt: skip
+    with pytest.raises(Refusal, match="'Elm' is in this scene already"):
+        editor.at_cursor("textDocument/rename", newName="Elm")
+
+
+def test_a_path_with_dots_is_the_file_that_it_leads_to(tmp_path):
+    (tmp_path / "lib.plsys").write_text(LIBRARY)
+    (tmp_path / "sub").mkdir()
+    scene = '#include "sub/../lib.plsys"\nobject { Oak }\nSelection Oak { Oak -> T_<cursor>up box; }\n'
+    editor = Editor({"scene.plsys": scene}, folder=tmp_path)
+    (place,) = editor.at_cursor("textDocument/definition")
+    assert place["uri"] == (tmp_path / "lib.plsys").as_uri()
+    (link,) = editor.in_file("textDocument/documentLink")
+    assert link["target"] == (tmp_path / "lib.plsys").as_uri()
 
 
 def test_a_library_is_looked_at_in_its_scenes(folder):

@@ -84,6 +84,22 @@ def test_a_missing_include_and_its_arrival(tmp_path):
     assert editor.codes("main.plsys") == ["unknown-name"]
 
 
+def test_errors_of_an_included_file_that_is_not_open(tmp_path):
+    files = {
+        "main.plsys": '#include "lib.plsys"\nobject { Tree }\n',
+        "lib.plsys": '#include "deep.plsys"\nSelection Tree { Tree -> box; }\n',
+        "deep.plsys": "\nTransformation T_up { trans 0 1; }\nTransformation T_right { trans 1 0 0 }\n",
+    }
+    editor = Editor(files, tmp_path)
+    (found,) = [each for each in editor.published("main.plsys") if each["code"] == "include"]
+    assert found["message"] == "'deep.plsys' has 2 errors, the first in line 2: trans takes 3 arguments, not 2"
+    assert editor.text_of(found["range"], "main.plsys") == '"lib.plsys"' and found["severity"] == 1
+    (related,) = found["relatedInformation"]
+    assert related["location"]["uri"] == editor.uri("deep.plsys")
+    editor.open("deep.plsys", files["deep.plsys"])  # now they are seen where they are
+    assert "include" not in editor.codes("main.plsys") and editor.codes("deep.plsys").count("wrong-arguments") == 1
+
+
 def test_an_included_file_is_seen_as_part_of_its_scene(tmp_path):
     files = {"main.plsys": '#include "lib.plsys"\n#declare Height = 2;\n', "lib.plsys": "sphere { 0, Height }\n"}
     editor = Editor(files, tmp_path)
