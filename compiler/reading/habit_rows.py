@@ -37,7 +37,7 @@ def _words(*names: str) -> str:
     return rf"\b(?:{'|'.join(sorted(names, key=len, reverse=True))})\b"
 
 
-_NUMBER = r"-?\d+(?:\.\d+)?"
+_NUMBER = r"-?\d+(?:\.\d+)?(?![\w.])"  # the whole of it
 _VALUE = r"[\w.*/+-]+"
 _INNER = r"(?:[^();{}]|\([^();{}]*\))*?"  # what a bracket holds, one level of brackets deep
 _OPERATION = _words(*vocabulary.OPERATIONS)
@@ -94,11 +94,12 @@ HABITS: tuple[Habit, ...] = (
     # operators and operands of rules
     _row(_RULES, r"\b(\w+)(?:\([^()]*\))?\s*->(?:(?!\belse\b|\bif\b|->|;).)*?\b(?!\1\b)\w+\)?\s*(?P<at>->)\s*[\w(\[]", "a rule has one '->'", "'+' joins what it produces", "+"),
     _row(_RULES, rf"(?P<at>\[\s*({_NUMBER}(?:\s+{_NUMBER}|\s*,\s*{_NUMBER}){{2}})\s*\])", "the name of an operation stands before its numbers", mend=r"[ trans \2 ]"),
+    _row(_RULES, rf"(?P<at>\[\s*{_NUMBER}(?:[\s,]+{_NUMBER})*\s*\])", "the name of an operation stands before its numbers", "write [ trans 0 0 1 ], or [ scale 0.5 ]"),
     _row(_RULES, rf"{_ARROW}\s*(?P<at>(\w+\s*[-+*/]?=(?![=>])\s*{_NUMBER}))(?=\s*[A-Za-z_(\[])", "what changes a parameter stands in square brackets", mend=r"[ \2 ]"),
     _row(_RULES, rf"(?P<at>\(\s*({_OPERATION}[^()\[\]{{}};]*)\))", "operators with arguments stand in square brackets", mend=r"[ \2 ]"),
     _row(_RULES, rf"(?:{_ARROW}|\+)?\s*(?P<at>\{{\s*((?:{_OPERATION}|--|\+\+|\w+\s*[-+*/]?=(?![=>]))[^{{}}\[\]]*?)\s*\}})\s*[\w(\[]",
          "operators stand in square brackets", mend=r"[ \2 ]"),
-    _row(_RULES, rf"(?P<at>({_OPERATION}(?:[\s,]+{_NUMBER})+))(?=\s*[\w(\[])", "operators with arguments stand in square brackets", mend=r"[ \2 ]"),
+    _row(_RULES, rf"(?P<at>({_OPERATION}(?:[\s,]+{_NUMBER})+))(?=\s*[A-Za-z_(\[])", "operators with arguments stand in square brackets", mend=r"[ \2 ]"),
     _row(_RULES, rf"{_ARROW}\s*(?:\w+\s+)*?(?P<at>((?:--|\+\+)\s*\w+|\w+\s*(?:--|\+\+)))(?=\s*[\w(\[])", "what changes a parameter stands in square brackets",
          mend=r"[ \2 ]"),
     _row(_RULES, rf"{_ARROW}\s*(?P<at>(\w+\s*[-+*/]?=(?![=>])\s*[^;,]+?)\s*,)", "what changes a parameter stands in square brackets", mend=r"[ \2 ]"),

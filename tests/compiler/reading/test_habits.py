@@ -79,6 +79,7 @@ EXAMPLES = [
     both(rule, "if (n > 0) A -> box; else: A -> sphere;", "if (n > 0) A -> box; else A -> sphere;"),
     both(rule, "A -> box -> sphere;", "A -> box + sphere;"),
     both(rule, "A -> [0, 0, 1] box;", "A -> [ trans 0, 0, 1 ] box;"),
+    both(rule, "A -> [0.5] box;", None),
     both(rule, "A -> n = 2 box;", "A -> [ n = 2 ] box;"),
     # conditions and expressions
     both(rule, "if (n =< 0) A -> box;", "if (n <= 0) A -> box;"),
@@ -182,6 +183,11 @@ def test_every_habit_has_an_example(monkeypatch):
     for before, _ in EXAMPLES:
         parse(Source.from_text(AROUND.format(before)))
     assert [habit.pattern.pattern for habit in HABITS if habit not in seen] == []
+
+
+def test_a_number_is_not_torn_apart():
+    (said,) = parse(Source.from_text("Selection A { A -> trans 0 0 0.24; }"))[1].items
+    assert said.mend is None
 
 
 def test_a_habit_in_a_comment_or_a_text_is_none():
