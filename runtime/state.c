@@ -32,6 +32,7 @@ typedef struct builder {
     pl_states *states;
     pl_walk walk;
     pl_scope scope;
+    struct pl_block *item_blocks; /* of items, until they stand one after another */
     pl_array items, chain, path, visits, open, members, scopes, trails, trail_counts, key;
     uint64_t omitted; /* bit i: the i-th symbol that the scene itself enters */
     pl_error *error;
@@ -75,6 +76,17 @@ static void *keep(builder *b, const void *data, size_t bytes)
     void *place = pl_states_allocate(b->states, bytes ? bytes : 1, b->error);
     if (place && bytes) memcpy(place, data, bytes);
     return place;
+}
+
+/* Items have blocks of their own, so that they can be moved. */
+static pl_item *keep_items(builder *b)
+{
+    struct pl_block *others = b->states->blocks;
+    b->states->blocks = b->item_blocks;
+    pl_item *items = keep(b, b->items.data, b->items.count * sizeof *items);
+    b->item_blocks = b->states->blocks;
+    b->states->blocks = others;
+    return items;
 }
 
 void pl_blocks_free(struct pl_block *blocks)
@@ -306,7 +318,7 @@ static bool begin_visit(builder *b, uint32_t symbol, const uint64_t *key)
     visit v = {b->states->count, 0, b->states->count, b->scopes.count, b->scopes.count};
     open_state open = {b->states->count, b->trails.count, b->trail_counts.count};
     if (!add_state(b, symbol, key) || !derive_items(b)) return false;
-    pl_item *items = keep(b, b->items.data, b->items.count * sizeof *items);
+    pl_item *items = keep_items(b);
     visit *place = pl_array_extend(&b->visits, 1);
     open_state *open_place = pl_array_extend(&b->open, 1);
     if (!items) return false;
@@ -474,6 +486,27 @@ static bool explore(builder *b)
     return true;
 }
 
+/* Moves the items of all states into one array, in the states' order. */
+static bool line_up_items(builder *b)
+{
+    pl_states *states = b->states;
+    size_t count = 0, freed = 0;
+    for (uint32_t i = 0; i < states->count; i++) count += states->list[i].item_count;
+    pl_item *items = pl_states_allocate(states, (count + 1) * sizeof *items, b->error);
+    if (!items) return false;
+    states->items = items;
+    states->item_count = count;
+    for (uint32_t i = 0; i < states->count; i++) {
+        pl_state *state = &states->list[i];
+        memcpy(items, state->items, state->item_count * sizeof *items);
+        state->items = items;
+        items += state->item_count;
+    }
+    for (const struct pl_block *block = b->item_blocks; block; block = block->next) freed += sizeof *block + block->size;
+    states->bytes -= freed;
+    return true;
+}
+
 bool pl_states_build(pl_states *states, const pl_program *program, pl_mesh_tree *const *meshes, bool node_boxes,
                      size_t limit, uint32_t most, pl_error *error)
 {
@@ -508,7 +541,8 @@ bool pl_states_build_without(pl_states *states, uint64_t omitted, const pl_progr
         for (uint32_t i = 0; ok && i < program->node_count; i++)
             states->node_boxes[i] = (pl_node_box){.box = pl_box_empty()};
     }
-    ok = ok && explore(&b);
+    ok = ok && explore(&b) && line_up_items(&b);
+    pl_blocks_free(b.item_blocks);
     pl_walk_end(&b.walk);
     free(b.scope.parameters);
     pl_array *arrays[] = {&b.items, &b.chain, &b.path, &b.visits, &b.open, &b.members, &b.scopes, &b.trails, &b.trail_counts, &b.key};

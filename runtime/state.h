@@ -69,6 +69,8 @@ typedef struct pl_states {
     pl_mesh_tree *const *meshes;
     pl_state *list;
     uint32_t count, capacity;
+    const pl_item *items; /* of all states, one after another: set when all are known */
+    size_t item_count;
     uint32_t *table; /* open addressing: state + 1; 0: free */
     uint32_t table_size;
     pl_node_box *node_boxes; /* per graph node; NULL unless asked for */
@@ -88,18 +90,11 @@ bool pl_states_build_without(pl_states *states, uint64_t omitted, const pl_progr
                              bool node_boxes, size_t limit, uint32_t most, pl_error *error);
 void pl_states_free(pl_states *states);
 
-/* The items as they were before packing, for those who still point at them. */
-typedef struct pl_unpacked {
-    const pl_item **items; /* of each state */
-    struct pl_block *blocks;
-} pl_unpacked;
-
 /* Moves what tracing needs into one block of exact size: items, terms, to_object and form of transformations (the rest of
  * pl_transform is gone). Boxes and counts stay; nothing can be looked up or built from the states afterwards. */
-bool pl_states_pack(pl_states *states, pl_unpacked *old, pl_error *error);
+bool pl_states_pack(pl_states *states, pl_error *error);
 /* What they will take then. */
 bool pl_states_packed_bytes(const pl_states *states, size_t *bytes, pl_error *error);
-void pl_unpacked_free(pl_unpacked *old);
 
 /* The primitive index, in derivation order, of the leaf at a path; UINT64_MAX if the path doesn't exist. depth: 0, or
  * the number of symbols entered where the path ends at an instance of a state: then its first primitive's. */

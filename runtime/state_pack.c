@@ -87,9 +87,9 @@ static void lay_out(packer *p)
     const pl_states *states = p->states;
     p->used = 0;
     memset(p->table, 0, p->table_size * sizeof *p->table);
+    size_t items = take(p, states->item_count * sizeof *states->items);
     for (uint32_t i = 0; i < states->count; i++) {
         pl_state *state = &states->list[i];
-        size_t items = take(p, state->item_count * sizeof *state->items);
         for (uint32_t k = 0; k < state->item_count; k++) {
             pl_item item = state->items[k];
             size_t terms = put_shared(p, item.terms, item.term_count * sizeof *item.terms);
@@ -100,15 +100,14 @@ static void lay_out(packer *p)
         }
         if (p->memory) state->items = (const pl_item *)(p->memory + items);
         if (p->memory) state->key = NULL;
+        items += state->item_count * sizeof *state->items;
     }
 }
 
 static bool begin(packer *p, const pl_states *states, pl_error *error)
 {
-    size_t items = 0;
-    for (uint32_t i = 0; i < states->count; i++) items += states->list[i].item_count;
     *p = (packer){.states = states, .table_size = 16};
-    while (p->table_size < 4 * items) p->table_size *= 2; /* two lists an item */
+    while (p->table_size < 4 * states->item_count) p->table_size *= 2; /* two lists an item */
     p->table = malloc(p->table_size * sizeof *p->table);
     if (!p->table) return pl_fail_memory(error, "packing the states");
     lay_out(p);
@@ -129,36 +128,28 @@ bool pl_states_packed_bytes(const pl_states *states, size_t *bytes, pl_error *er
     return true;
 }
 
-bool pl_states_pack(pl_states *states, pl_unpacked *old, pl_error *error)
+bool pl_states_pack(pl_states *states, pl_error *error)
 {
     packer p;
     if (!begin(&p, states, error)) return false;
     struct pl_block *block = malloc(sizeof *block + p.used);
-    *old = (pl_unpacked){.items = malloc((states->count + 1) * sizeof *old->items), .blocks = states->blocks};
-    if (!block || !old->items) {
+    if (!block) {
         free(p.table);
-        free(block);
-        free(old->items);
         return pl_fail_memory(error, "packing the states");
     }
     *block = (struct pl_block){.used = p.used, .size = p.used};
-    for (uint32_t i = 0; i < states->count; i++) old->items[i] = states->list[i].items;
     p.memory = block->memory;
     lay_out(&p);
     free(p.table);
     free(states->table);
     states->table = NULL;
     states->table_size = 0;
+    pl_blocks_free(states->blocks);
     states->blocks = block;
+    states->items = (const pl_item *)block->memory;
     pl_state *list = realloc(states->list, states->count * sizeof *list);
     if (list) states->list = list;
     states->capacity = states->count;
     states->bytes = whole_bytes(&p);
     return true;
-}
-
-void pl_unpacked_free(pl_unpacked *old)
-{
-    free(old->items);
-    pl_blocks_free(old->blocks);
 }

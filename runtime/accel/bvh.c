@@ -10,13 +10,13 @@
 
 static void *work_create(const pl_scene *scene, pl_error *error)
 {
-    (void)scene;
     pl_bvh_work *w = calloc(1, sizeof *w);
     if (!w || !pl_bvh_grow_frames(w, 0, error) || !pl_bvh_grow_stack(w, 0, error)) {
         free(w);
         pl_fail_memory(error, "preparing to trace");
         return NULL;
     }
+    w->states = &scene->states;
     return w;
 }
 
@@ -68,11 +68,12 @@ bool pl_bvh_grow_packet_stack(pl_bvh_work *w, size_t top, pl_error *error)
 
 bool pl_bvh_chain(pl_bvh_work *w, const pl_front *front, uint32_t opened, size_t *count, pl_error *error)
 {
+    const pl_item *items = w->states->items;
     size_t length = 0;
     for (uint32_t at = front->opened[opened].moved; at; at = front->opened[front->opened[at].parent].moved) {
         if (length >= w->chain_capacity && !grow(&w->chain, length + 1, &w->chain_capacity, sizeof *w->chain, error))
             return false;
-        w->chain[length++] = front->opened[at].item;
+        w->chain[length++] = &items[front->opened[at].item];
     }
     *count = length;
     return true;
@@ -94,8 +95,7 @@ static bool map_down(pl_bvh_work *w, const pl_front *front, uint32_t opened, con
 
 static const pl_item *instance_item(const pl_scene *scene, const pl_front *front, uint32_t instance)
 {
-    const pl_front_instance *it = &front->instances[instance];
-    return pl_front_item(&scene->states, front, it->opened, it->item);
+    return pl_front_item(&scene->states, front->places[instance].item);
 }
 
 /* The normative ray of a frame, from the deepest frame above that has one. */
@@ -108,7 +108,7 @@ static bool map_frame(const pl_scene *scene, pl_bvh_work *w, uint32_t index, pl_
         pl_frame *f = &w->frames[from + 1];
         memcpy(f->normative_o, parent->normative_o, sizeof f->normative_o);
         memcpy(f->normative_d, parent->normative_d, sizeof f->normative_d);
-        if (!map_down(w, parent->front, parent->front->instances[f->instance].opened,
+        if (!map_down(w, parent->front, parent->front->places[f->instance].opened,
                       instance_item(scene, parent->front, f->instance), f->normative_o, f->normative_d, error))
             return false;
         f->mapped = true;
@@ -158,7 +158,7 @@ bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *q
     const pl_scene *scene = tracer->scene;
     pl_frame *f = &w->frames[frame];
     const pl_front_primitive *primitive = &f->front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = pl_front_item(&scene->states, f->front, primitive->opened, primitive->item);
+    const pl_item *item = pl_front_item(&scene->states, primitive->item);
     double o[3], d[3];
     if (!f->mapped && !map_frame(scene, w, frame, query->error)) return false;
     memcpy(o, f->normative_o, sizeof o);
@@ -175,12 +175,14 @@ static bool trail_items(const pl_scene *scene, const pl_path *trail, pl_items *i
     const pl_front *front = &fronts->list[0];
     items->count = 0;
     for (uint32_t i = 0; i + 1 < trail->length; i++) {
-        const pl_front_instance *instance = &front->instances[trail->terms[i]];
-        if (!pl_front_add_items(items, front, instance->opened, instance_item(scene, front, trail->terms[i]))) return false;
-        front = &fronts->list[instance->front];
+        const uint32_t instance = trail->terms[i];
+        if (!pl_front_add_items(items, &scene->states, front, front->places[instance].opened, instance_item(scene, front, instance)))
+            return false;
+        front = &fronts->list[front->instances[instance].front & ~PL_NO_SHADOW];
     }
     const pl_front_primitive *leaf = &front->primitives[trail->terms[trail->length - 1] & PL_REF_INDEX];
-    return pl_front_add_items(items, front, leaf->opened, pl_front_item(&scene->states, front, leaf->opened, leaf->item));
+    return pl_front_add_items(items, &scene->states, front, leaf->opened,
+                              pl_front_item(&scene->states, leaf->item));
 }
 
 /* --- which kernel --- */

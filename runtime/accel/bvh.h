@@ -46,6 +46,7 @@ typedef struct pl_packet_frame {
 } pl_packet_frame;
 
 typedef struct pl_bvh_work {
+    const pl_states *states;
     pl_frame *frames;
     uint64_t *stack; /* local t of entry as float bits, reference below */
     const pl_item **chain;

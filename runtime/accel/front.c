@@ -84,6 +84,9 @@ static bool keep(pl_front *front, pl_front_items *items, int threads)
     front->nodes = pl_front_tree(items->boxes, items->box_count, &front->node_count, &front->root, threads);
     front->primitives = items->primitives;
     front->instances = items->instances;
+    front->places = items->places;
+    front->fine = items->fine;
+    front->bounds = items->bounds;
     front->opened = items->opened;
     front->unbounded = items->unbounded;
     front->unbounded_count = (uint32_t)items->unbounded_count;
@@ -185,7 +188,7 @@ static void add_to(pl_fronts *sums, const pl_front *front, const pl_front_counts
     if (items > sums->most_items) sums->most_items = items;
     sums->node_bytes += rounded(front->node_count * sizeof *front->nodes);
     sums->item_bytes += rounded(counts->primitives * sizeof *front->primitives) +
-                        rounded(counts->instances * sizeof *front->instances) +
+                        rounded(counts->instances * pl_front_instance_bytes(front->fine)) +
                         rounded(counts->opened * sizeof *front->opened) +
                         (front->unbounded_count + 1) * sizeof *front->unbounded;
 }
@@ -232,23 +235,6 @@ bool pl_front_count(pl_compositions *compositions, uint32_t state, uint64_t most
     return ok || pl_fail_memory(error, "planning the fronts");
 }
 
-/* Packs the states, which nothing is built from any more, and turns what points at their items. */
-static bool pack(pl_scene *scene, pl_fronts *fronts, pl_error *error)
-{
-    pl_unpacked old;
-    if (!pl_states_pack(&scene->states, &old, error)) return false;
-    for (uint32_t i = 0; i < fronts->count; i++) {
-        pl_front *front = &fronts->list[i];
-        pl_opened *opened = (pl_opened *)front->opened;
-        for (uint32_t k = 1; k < front->opened_count; k++) { /* parents stand before their children */
-            uint32_t parent = opened[k].parent, state = parent ? opened[parent].item->what : front->state;
-            opened[k].item = &scene->states.list[state].items[opened[k].item - old.items[state]];
-        }
-    }
-    pl_unpacked_free(&old);
-    return true;
-}
-
 bool pl_fronts_build(pl_scene *scene, pl_error *error)
 {
     pl_fronts *fronts = scene->structure = calloc(1, sizeof *fronts);
@@ -264,7 +250,7 @@ bool pl_fronts_build(pl_scene *scene, pl_error *error)
     fronts->entries = ok ? plan->entries : 0.0;
     pl_front_plan_free(plan);
     pl_compositions_free(compositions);
-    return ok && pack(scene, fronts, error);
+    return ok && pl_states_pack(&scene->states, error);
 }
 
 void pl_fronts_destroy(pl_scene *scene)
@@ -293,10 +279,10 @@ void pl_fronts_count(const pl_scene *scene, pl_statistics *counts)
     counts->front_pilot_seconds = fronts->pilot_seconds;
 }
 
-bool pl_front_add_items(pl_items *items, const pl_front *front, uint32_t opened, const pl_item *last)
+bool pl_front_add_items(pl_items *items, const pl_states *states, const pl_front *front, uint32_t opened, const pl_item *last)
 {
     size_t begin = items->count, count = 1;
-    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent]) count++;
+    for (uint32_t at = opened; at; at = front->opened[at].parent) count++;
     if (begin + count > items->capacity) {
         size_t capacity = 2 * (begin + count) + 16;
         const pl_item **list = realloc(items->list, capacity * sizeof *list);
@@ -306,7 +292,7 @@ bool pl_front_add_items(pl_items *items, const pl_front *front, uint32_t opened,
     }
     items->count = begin + count;
     items->list[begin + --count] = last;
-    for (const pl_opened *at = &front->opened[opened]; at->item; at = &front->opened[at->parent])
-        items->list[begin + --count] = at->item;
+    for (uint32_t at = opened; at; at = front->opened[at].parent)
+        items->list[begin + --count] = pl_front_item(states, front->opened[at].item);
     return true;
 }

@@ -43,10 +43,9 @@ typedef struct pl_front_node {
     pl_ref child[PL_FRONT_WIDTH];
 } pl_front_node;
 
-/* A state that stands opened in a front. Node 0 is the front's own state. */
+/* A state that stands opened in a front, reached by `item` (of pl_states.items). Node 0 is the front's own state. */
 typedef struct pl_opened {
-    const pl_item *item; /* of the parent's state, and leading to this one; NULL: node 0 */
-    uint32_t parent;
+    uint32_t item, parent;
     uint32_t moved; /* the nearest node from this one up whose item has transformations, or 0 */
 } pl_opened;
 
@@ -55,25 +54,48 @@ typedef struct pl_front_primitive {
     float stretch;        /* no less than its largest singular value */
     float argument;
     uint32_t opened;     /* where it stands … */
-    uint32_t item;       /* … and which item of that state; | PL_NO_SHADOW */
+    uint32_t item;       /* … and which item it is (of pl_states.items); | PL_NO_SHADOW */
 } pl_front_primitive;
 
-/* How far rays' origins can lie from that of the normative ray (error), and what bounds their distance from the frame's
- * origin (distance), both in the unit frame, go down a path together:
- *
- *     error' = stretch * error + gain * distance + base        distance' = stretch * distance + offset */
+/* The composed map from a front's unit frame to that of an instance, p' = L·(p - centre), in one line of the cache. L is
+ * rounded to single precision: as centre is where the middle of the instance's box comes from, that moves the points of
+ * the box by some 2^-24 of its size only. */
 typedef struct pl_front_instance {
-    double columns[3 * 4]; /* composed map of points, front's unit frame -> instance's, column by column; what follows is
-                              read with the last */
-    float stretch, gain, base, offset;
-    uint32_t front, opened;
-    uint32_t item; /* | PL_NO_SHADOW */
+    double centre[3];
+    float columns[3 * 3]; /* of L */
+    uint32_t front;       /* | PL_NO_SHADOW */
 } pl_front_instance;
+
+/* What the rounding of L lost. Scenes have it where an error in one unit frame would be seen in those far below, which
+ * are magnified a great deal. */
+typedef struct pl_front_fine {
+    float columns[3 * 3];
+} pl_front_fine;
+
+/* Where an instance stands: an opened node, and an item of its state (of pl_states.items). */
+typedef struct pl_front_place {
+    uint32_t opened, item;
+} pl_front_place;
+
+static inline size_t pl_front_instance_bytes(bool fine)
+{
+    return sizeof(pl_front_instance) + sizeof(pl_front_place) + (fine ? sizeof(pl_front_fine) : 0);
+}
+
+/* How far rays' origins can lie from that of the normative ray (error), and what bounds their distance from the frame's
+ * origin (distance), both in the unit frame, go down a path together; with s = stretch·√ΣL²,
+ *
+ *     error' = s·(error + gain·distance + base) + rough        distance' = s·(distance + |centre|) */
+typedef struct pl_front_bounds {
+    float stretch, gain, base, rough; /* the largest of its instances; stretch: 1/√3 where all maps keep shapes */
+} pl_front_bounds;
 
 typedef struct pl_front {
     const pl_front_node *nodes;
     const pl_front_primitive *primitives;
     const pl_front_instance *instances;
+    const pl_front_place *places; /* of the instances, in the same memory … */
+    const pl_front_fine *fine;    /* … as these are; NULL: not wanted */
     const pl_opened *opened;
     const pl_ref *unbounded; /* without bounds: always visited */
     uint32_t unbounded_count, instance_count, opened_count, node_count;
@@ -82,6 +104,7 @@ typedef struct pl_front {
     bool framed;             /* its box is finite; else all items are unbounded */
     double centre[4], scale; /* unit frame: (p - centre) * scale */
     float half[4];           /* of the box in the unit frame */
+    pl_front_bounds bounds;
     float slack_gain, slack_base; /* no normative hit lies farther outside its box, there, than gain * distance + base */
     pl_box box;              /* of the bounded items, in the state's frame */
     pl_reach reach;
@@ -89,15 +112,14 @@ typedef struct pl_front {
 
 #define PL_NOTHING UINT32_MAX
 
-/* The item of an opened node's state. */
-static inline const pl_item *pl_front_item(const pl_states *states, const pl_front *front, uint32_t opened, uint32_t item)
+/* The item of a primitive, of an instance's place or of an opened node but the first. */
+static inline const pl_item *pl_front_item(const pl_states *states, uint32_t item)
 {
-    const pl_item *by = front->opened[opened].item;
-    return &states->list[by ? by->what : front->state].items[item & ~PL_NO_SHADOW];
+    return &states->items[item & ~PL_NO_SHADOW];
 }
 
 /* Adds the items on the way through a front: those of the states opened down to `opened`, then `last`. false: no memory. */
-bool pl_front_add_items(pl_items *items, const pl_front *front, uint32_t opened, const pl_item *last);
+bool pl_front_add_items(pl_items *items, const pl_states *states, const pl_front *front, uint32_t opened, const pl_item *last);
 
 typedef struct pl_fronts {
     pl_front *list; /* 0: the scene */
@@ -124,9 +146,12 @@ typedef struct pl_boxed {
 typedef struct pl_front_items {
     pl_front_primitive *primitives;
     pl_front_instance *instances;
+    pl_front_place *places; /* behind the instances, as … */
+    pl_front_fine *fine;    /* … these are; or NULL */
     pl_opened *opened;
     pl_ref *unbounded;
     pl_boxed *boxes;
+    pl_front_bounds bounds;
     size_t primitive_count, instance_count, opened_count, unbounded_count, box_count;
 } pl_front_items;
 
@@ -192,6 +217,7 @@ typedef struct pl_front_plan {
     uint32_t *front_of;   /* state -> front + 1; for the builder's use */
     double *bytes;        /* of a copy of a state, less the instance that it replaces */
     bool *price_free;     /* opened always: one item, or but one place */
+    bool fine;            /* the fronts' instances have pl_front_fine */
     float *probability;   /* of entering an item from its state, by composition */
     double *visits;       /* of each front, a ray */
     double *threshold;    /* of each front: probability a byte */
@@ -227,6 +253,9 @@ static inline bool pl_front_opens(const pl_front_plan *plan, double threshold, d
 {
     return (plan->price_free[state] && threshold == threshold) || reached > threshold * plan->bytes[state];
 }
+
+/* The scale of a state's unit frame. */
+double pl_front_scale(const pl_states *states, uint32_t state);
 
 /* Sets what of a front follows from its state's box and reach: the unit frame, in which the box of the bounded items is centred
  * and scaled to [-1, 1], and the slack. */

@@ -43,6 +43,7 @@ typedef struct opening {
     place *stack;
     size_t count, capacity;
     bool odd; /* has items that are in no box */
+    pl_front_bounds bounds;
 } opening;
 
 static chain chain_identity(void)
@@ -131,24 +132,29 @@ static double length(const double v[3])
     return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
+double pl_front_scale(const pl_states *states, uint32_t state)
+{
+    const pl_box *box = &states->list[state].box;
+    double half = 0.0;
+    if (pl_box_is_empty(box) || !pl_box_is_finite(box)) return 1.0;
+    for (int axis = 0; axis < 3; axis++) half = fmax(half, 0.5 * box->hi[axis] - 0.5 * box->lo[axis]);
+    return half > 0.0 ? fmin(1.0 / half, 1e300) : 1.0;
+}
+
 /* Slack: reach.h's (twice: boxes here are composed too), and moving a ray along itself to a front's box. */
 void pl_front_set_frame(pl_front *front, const pl_states *states, uint32_t state)
 {
     const pl_box *box = &states->list[state].box;
-    double half = 0.0;
     front->state = state;
     front->box = *box;
     front->reach = states->list[state].reach;
     memset(front->centre, 0, sizeof front->centre);
-    front->scale = 1.0;
+    front->scale = pl_front_scale(states, state);
     front->framed = !pl_box_is_empty(box) && pl_box_is_finite(box);
     for (int axis = 0; front->framed && axis < 3; axis++) {
         front->centre[axis] = 0.5 * box->lo[axis] + 0.5 * box->hi[axis];
-        half = fmax(half, 0.5 * box->hi[axis] - 0.5 * box->lo[axis]);
-    }
-    if (half > 0.0) front->scale = fmin(1.0 / half, 1e300);
-    for (int axis = 0; front->framed && axis < 3; axis++)
         front->half[axis] = (float)((0.5 * box->hi[axis] - 0.5 * box->lo[axis]) * front->scale);
+    }
     const pl_reach *reach = &front->reach;
     double away = length(front->centre);
     front->slack_gain = bound(DBL_EPSILON * (2.0 * reach->gain + 16.0));
@@ -171,7 +177,12 @@ static void set_box(opening *o, size_t index, const pl_box *box, bool unbounded,
     o->odd = o->odd || !(boxed->lo[0] <= boxed->hi[0]);
 }
 
-static void add_primitive(opening *o, const chain *at, const pl_item *item, uint32_t index, bool no_shadow)
+static uint32_t number_of(const pl_states *states, const pl_item *item)
+{
+    return (uint32_t)(item - states->items);
+}
+
+static void add_primitive(opening *o, const chain *at, const pl_item *item, bool no_shadow)
 {
     const pl_states *states = o->plan->compositions->states;
     const size_t place = o->primitive++;
@@ -190,7 +201,7 @@ static void add_primitive(opening *o, const chain *at, const pl_item *item, uint
     p->stretch = pl_round_up(sqrt(square) * (1.0 + 0x1p-20));
     p->argument = (float)item->arguments[0];
     p->opened = (uint32_t)o->opened - 1;
-    p->item = index | (no_shadow ? PL_NO_SHADOW : 0);
+    p->item = number_of(states, item) | (no_shadow ? PL_NO_SHADOW : 0);
     const bool mesh = item->kind == PL_NODE_MESH;
     const pl_shape *shape = mesh ? NULL : pl_shape_of(item->what);
     const pl_box box = mesh ? pl_box_map(&at->to_parent, pl_mesh_box(states->meshes[item->what]))
@@ -199,40 +210,77 @@ static void add_primitive(opening *o, const chain *at, const pl_item *item, uint
     set_box(o, place, &box, !mesh && !shape->support, pl_ref_of(kind, (uint32_t)place));
 }
 
-/* The map from a front's unit frame to that of an instance in it, and its bounds (front.h). Beyond what chain bounds: the
- * rounding of what is composed here, for points within a few units. */
-static void set_instance_map(pl_front_instance *it, const pl_front *outer, const pl_front *inner, const chain *at)
+static void join_bounds(pl_front_bounds *bounds, const pl_front_bounds *other)
 {
-    const double *m = at->to_object.m, size = 1.0 / outer->scale, zoom = inner->scale * size;
-    double away = length(outer->centre);
-    double stretch = at->stretch * zoom;
-    double offset = inner->scale * (at->stretch * away + at->offset + length(inner->centre));
-    double base = inner->scale * (at->gain * (2.0 * away + outer->reach.size) + at->base);
-    it->stretch = bound(stretch);
-    it->offset = bound(offset);
-    it->gain = bound(DBL_EPSILON * (2.0 * at->gain * zoom + ROUNDINGS * stretch));
-    it->base = bound(DBL_EPSILON * (base + ROUNDINGS * (offset + 4.0 * stretch)));
-    for (int r = 0; r < 3; r++) {
-        for (int c = 0; c < 3; c++) it->columns[3 * c + r] = m[4 * r + c] * zoom;
-        double centre[3];
-        pl_affine_point(&at->to_object, outer->centre, centre);
-        it->columns[9 + r] = (centre[r] - inner->centre[r]) * inner->scale;
-    }
+    bounds->stretch = fmaxf(bounds->stretch, other->stretch);
+    bounds->gain = fmaxf(bounds->gain, other->gain);
+    bounds->base = fmaxf(bounds->base, other->base);
+    bounds->rough = fmaxf(bounds->rough, other->rough);
 }
 
-static void add_instance(opening *o, const chain *at, const pl_item *item, uint32_t index, bool no_shadow)
+/* The point of a front's unit frame that a chain brings to the origin of an instance's. *left: how far it misses that. Its
+ * own map to the parent is inverse but for rounding, which one step of Newton's method makes up for. */
+static void find_centre(double centre[3], const pl_front *outer, const pl_front *inner, const chain *at, double *left)
+{
+    double from[3], to[3], miss[3] = {0}, back[3];
+    pl_affine_point(&at->to_parent, inner->centre, from);
+    for (int axis = 0; axis < 3; axis++) centre[axis] = (from[axis] - outer->centre[axis]) * outer->scale;
+    for (int step = 0; step < 2; step++) {
+        pl_affine_vector(&at->to_parent, miss, back);
+        for (int axis = 0; axis < 3; axis++) {
+            centre[axis] -= back[axis] * outer->scale;
+            from[axis] = outer->centre[axis] + centre[axis] / outer->scale;
+        }
+        pl_affine_point(&at->to_object, from, to);
+        for (int axis = 0; axis < 3; axis++) miss[axis] = to[axis] - inner->centre[axis];
+    }
+    *left = length(miss) * inner->scale;
+}
+
+/* The map from a front's unit frame to that of an instance in it, and its bounds (front.h). Beyond what chain bounds: the
+ * rounding of what is composed here, for points within a few units, and that of L for points of the instance's box.
+ * fine may be NULL. */
+static void set_instance_map(pl_front_instance *it, pl_front_fine *fine, const pl_front *outer, const pl_front *inner,
+                             const chain *at, pl_front_bounds *bounds)
+{
+    const double size = 1.0 / outer->scale, zoom = inner->scale * size;
+    double away = length(outer->centre), square = 0.0, rough = 0.0, left;
+    find_centre(it->centre, outer, inner, at, &left);
+    for (int r = 0; r < 3; r++) {
+        double moved = 0.0;
+        for (int c = 0; c < 3; c++) {
+            const double exact = at->to_object.m[4 * r + c] * zoom;
+            double kept = it->columns[3 * c + r] = (float)exact;
+            if (fine) kept += (double)(fine->columns[3 * c + r] = (float)(exact - kept));
+            double reach = 0.0; /* of the instance's box, from its middle along axis c of the front's unit frame */
+            for (int k = 0; k < 3; k++) reach += fabs(at->to_parent.m[4 * c + k]) * (double)inner->half[k];
+            square += kept * kept;
+            moved += fabs(kept - exact) * reach / zoom;
+        }
+        rough += moved;
+    }
+    const double norm = sqrt(square), stretch = fmin(at->stretch * zoom, norm), offset = stretch * length(it->centre);
+    const double gain = 2.0 * at->gain * zoom + ROUNDINGS * stretch;
+    const double base = inner->scale * (at->gain * (2.0 * away + outer->reach.size) + at->base) + left / DBL_EPSILON +
+                        ROUNDINGS * (offset + 4.0 * stretch + length(inner->centre) * inner->scale);
+    /* Squares of numbers much smaller than these would be lost. */
+    const bool told = outer->framed && norm > 1e-15;
+    *bounds = (pl_front_bounds){bound(stretch / norm * (1.0 + 0x1p-19)), bound(DBL_EPSILON * gain / stretch),
+                                bound(DBL_EPSILON * base / stretch), told ? bound(2.0 * rough) : INFINITY};
+}
+
+static void add_instance(opening *o, const chain *at, const pl_item *item, bool no_shadow)
 {
     const pl_states *states = o->plan->compositions->states;
     const size_t place = o->instance++;
-    pl_front_instance *it = &o->items->instances[place];
     pl_front inner = {0};
-    *it = (pl_front_instance){
-        .front = o->plan->front_of[item->what] - 1,
-        .opened = (uint32_t)o->opened - 1,
-        .item = index | (no_shadow ? PL_NO_SHADOW : 0),
-    };
+    pl_front_bounds bounds;
+    pl_front_instance *it = &o->items->instances[place];
+    *it = (pl_front_instance){.front = (o->plan->front_of[item->what] - 1) | (no_shadow ? PL_NO_SHADOW : 0)};
+    o->items->places[place] = (pl_front_place){(uint32_t)o->opened - 1, number_of(states, item)};
     pl_front_set_frame(&inner, states, item->what);
-    set_instance_map(it, o->front, &inner, at);
+    set_instance_map(it, o->items->fine ? &o->items->fine[place] : NULL, o->front, &inner, at, &bounds);
+    if (inner.framed) join_bounds(&o->bounds, &bounds);
     /* Where there are cut-offs the whole box may be drawn (cut.h). */
     const pl_box box = states->cuts ? pl_box_map(&at->to_parent, &states->list[item->what].box)
                                     : pl_box_under(states, item, &at->to_parent);
@@ -262,7 +310,7 @@ static bool open_state(opening *o, const place *from)
     const pl_state *it = &states->list[state];
     pl_opened *list = o->items->opened;
     const uint32_t moved = !from->item ? 0 : from->item->transform_count ? opened : list[from->parent].moved;
-    list[opened] = (pl_opened){from->item, from->parent, moved};
+    list[opened] = (pl_opened){from->item ? number_of(states, from->item) : 0, from->parent, moved};
     for (uint32_t i = it->item_count; i-- > 0;) {
         const pl_item *item = &it->items[i];
         const size_t composition = made->first[state] + i;
@@ -278,8 +326,8 @@ static bool open_state(opening *o, const place *from)
         }
         chain at = from->at;
         chain_append(&at, &made->list[composition]);
-        if (item->kind == PL_NODE_ENTER) add_instance(o, &at, item, i, no_shadow);
-        else add_primitive(o, &at, item, i, no_shadow);
+        if (item->kind == PL_NODE_ENTER) add_instance(o, &at, item, no_shadow);
+        else add_primitive(o, &at, item, no_shadow);
     }
     return true;
 }
@@ -338,6 +386,7 @@ static bool open_parallel(opening *o, int threads, pl_front_counting *counting)
     for (int i = 0; i < others; i++) pthread_join(started[i], NULL);
     for (int i = 0; i < t.number; i++) {
         o->odd = o->odd || openings[i].odd;
+        join_bounds(&o->bounds, &openings[i].bounds);
         free(openings[i].stack);
     }
     o->count = 0;
@@ -383,7 +432,9 @@ bool pl_front_open(const pl_front_plan *plan, const pl_front *front, int threads
                               .opened_count = counts->opened,
                               .box_count = counts->primitives + counts->instances};
     items->primitives = allocate(items->primitive_count, sizeof *items->primitives);
-    items->instances = allocate(items->instance_count, sizeof *items->instances);
+    items->instances = allocate(items->instance_count, pl_front_instance_bytes(plan->fine));
+    items->places = (pl_front_place *)(items->instances + items->instance_count);
+    items->fine = plan->fine ? (pl_front_fine *)(items->places + items->instance_count) : NULL;
     items->opened = allocate(items->opened_count, sizeof *items->opened);
     items->boxes = allocate(items->box_count, sizeof *items->boxes);
     bool ok = items->primitives && items->instances && items->opened && items->boxes;
@@ -398,6 +449,7 @@ bool pl_front_open(const pl_front_plan *plan, const pl_front *front, int threads
     }
     ok = ok && open_all(&o);
     free(o.stack);
+    items->bounds = o.bounds;
     if (ok && o.odd) ok = sort_out(items);
     return ok || pl_fail_memory(error, "building the fronts");
 }

@@ -24,7 +24,7 @@
 /* A primitive's share of nodes: about 7 of eight children are there, one of them a node. */
 #define NODE_BYTES_AN_ITEM (sizeof(pl_front_node) / 5.8)
 #define PRIMITIVE_BYTES (sizeof(pl_front_primitive) + NODE_BYTES_AN_ITEM)
-#define INSTANCE_BYTES (sizeof(pl_front_instance) + NODE_BYTES_AN_ITEM)
+#define INSTANCE_BYTES(plan) ((double)pl_front_instance_bytes((plan)->fine) + NODE_BYTES_AN_ITEM)
 #define PRIOR_VISITS 8.0
 
 /* Time besides instances, in instances: a ray of a flat scene takes about as long as entering so many (measured). */
@@ -34,6 +34,10 @@
 
 /* Opening anything adds more bytes than this, or nothing. */
 #define LEAST_STEP 1.0
+
+/* Rounding an instance's map moves points by some 2^-23 in its unit frame. What this becomes in frames that are so many times
+ * larger still isn't seen. */
+#define COARSE_ZOOM 4096.0
 
 enum { PRICES = 48 };
 
@@ -64,9 +68,8 @@ static bool sort_states(pl_front_plan *plan)
     return true;
 }
 
-/* What a copy of a state in another front adds: its items and itself, less the instance. What is opened always counts as
- * a part of the state that it stands in. */
-static void find_bytes(pl_front_plan *plan, bool once_is_free)
+/* Which states are opened always. */
+static void find_free(pl_front_plan *plan, bool once_is_free)
 {
     const pl_states *states = plan->compositions->states;
     uint32_t *references = plan->front_of; /* borrowed: counted once, then cleared */
@@ -75,22 +78,64 @@ static void find_bytes(pl_front_plan *plan, bool once_is_free)
             const pl_item *item = &states->list[i].items[k];
             if (item->kind == PL_NODE_ENTER && occurs(states, item)) references[item->what]++;
         }
+    for (uint32_t i = 0; i < states->count; i++) {
+        const pl_state *state = &states->list[i];
+        uint32_t live = 0;
+        for (uint32_t k = 0; k < state->item_count; k++) live += occurs(states, &state->items[k]);
+        plan->price_free[i] = (live <= 1 && !state->endless) || references[i] == 1;
+    }
+    memset(references, 0, states->count * sizeof *references);
+}
+
+/* How much larger the unit frame of any state below a state is told than in that state's own. */
+static double find_zoom(const pl_front_plan *plan, const double *zoom, uint32_t index)
+{
+    const pl_states *states = plan->compositions->states;
+    const pl_state *state = &states->list[index];
+    double largest = 1.0;
+    if (state->endless) return INFINITY;
+    for (uint32_t k = 0; k < state->item_count; k++) {
+        const pl_item *item = &state->items[k];
+        if (item->kind != PL_NODE_ENTER || !occurs(states, item)) continue;
+        const double stretch = plan->compositions->list[plan->compositions->first[index] + k].stretch;
+        const double grown = stretch * pl_front_scale(states, item->what) / pl_front_scale(states, index);
+        largest = fmax(largest, grown * zoom[item->what]);
+    }
+    return largest;
+}
+
+/* Whether single precision isn't enough for the maps of instances. false: no memory. */
+static bool find_fine(pl_front_plan *plan)
+{
+    const uint32_t count = plan->compositions->states->count;
+    double *zoom = malloc(count * sizeof *zoom);
+    if (!zoom) return false;
+    for (uint32_t i = count; i-- > 1;) {
+        const uint32_t index = plan->order[i];
+        zoom[index] = find_zoom(plan, zoom, index);
+        plan->fine = plan->fine || (!plan->price_free[index] && !(zoom[index] <= COARSE_ZOOM));
+    }
+    free(zoom);
+    return true;
+}
+
+/* What a copy of a state in another front adds: its items and itself, less the instance. What is opened always counts as
+ * a part of the state that it stands in. */
+static void find_bytes(pl_front_plan *plan)
+{
+    const pl_states *states = plan->compositions->states;
     for (uint32_t i = states->count; i-- > 0;) {
         const uint32_t index = plan->order[i];
         const pl_state *state = &states->list[index];
         double bytes = sizeof(pl_opened);
-        uint32_t live = 0;
         for (uint32_t k = 0; k < state->item_count; k++) {
             const pl_item *item = &state->items[k];
             if (!occurs(states, item)) continue;
-            live++;
             if (item->kind != PL_NODE_ENTER) bytes += PRIMITIVE_BYTES;
-            else bytes += INSTANCE_BYTES + (plan->price_free[item->what] ? plan->bytes[item->what] : 0.0);
+            else bytes += INSTANCE_BYTES(plan) + (plan->price_free[item->what] ? plan->bytes[item->what] : 0.0);
         }
-        plan->bytes[index] = fmax(bytes - INSTANCE_BYTES, 1.0);
-        plan->price_free[index] = (live <= 1 && !state->endless) || references[index] == 1;
+        plan->bytes[index] = fmax(bytes - INSTANCE_BYTES(plan), 1.0);
     }
-    memset(references, 0, states->count * sizeof *references);
 }
 
 /* The probability that a ray in a state enters an item of it. */
@@ -132,9 +177,12 @@ pl_front_plan *pl_front_plan_create(const pl_compositions *compositions, const p
         plan->probability = calloc(compositions->first[count] + 1, sizeof *plan->probability);
         if (plan->order && plan->front_of && plan->bytes && plan->price_free && plan->visits && plan->threshold &&
             plan->counts && plan->probability && sort_states(plan)) {
-            find_bytes(plan, once_is_free);
-            find_probabilities(plan, pilot);
-            return plan;
+            find_free(plan, once_is_free);
+            if (find_fine(plan)) {
+                find_bytes(plan);
+                find_probabilities(plan, pilot);
+                return plan;
+            }
         }
     }
     pl_front_plan_free(plan);
@@ -235,10 +283,10 @@ bool pl_front_plan_count(const pl_front_plan *plan, pl_front_counting *counting,
                        counts);
 }
 
-static double bytes_of(const pl_front_counts *counts)
+static double bytes_of(const pl_front_plan *plan, const pl_front_counts *counts)
 {
     return sizeof(pl_front) + 5 * 32.0 + (double)counts->primitives * PRIMITIVE_BYTES +
-           (double)counts->instances * INSTANCE_BYTES + (double)counts->opened * sizeof(pl_opened);
+           (double)counts->instances * INSTANCE_BYTES(plan) + (double)counts->opened * sizeof(pl_opened);
 }
 
 /* --- all fronts at a price --- */
@@ -266,7 +314,7 @@ static bool try_price(pl_front_plan *plan, double price, double enough, outcome 
                          plan->visits[state], plan->visits, &counts))
             return false;
         plan->counts[state] = counts;
-        out->bytes += bytes_of(&counts);
+        out->bytes += bytes_of(plan, &counts);
         out->instances += counts.instances;
         if (i > 0) out->entries += plan->visits[state];
         out->whole = counts.whole && out->bytes <= enough;
@@ -356,7 +404,7 @@ bool pl_front_plan_items(pl_front_plan *plan, uint64_t most, pl_error *error)
         ok = (most == UINT64_MAX || limit_front(plan, state, most)) &&
              count_front(plan, state, plan->threshold[state], UINT64_MAX, plan->visits[state], plan->visits, &counts);
         plan->counts[state] = counts;
-        plan->estimate += bytes_of(&counts);
+        plan->estimate += bytes_of(plan, &counts);
         if (i > 0) plan->entries += plan->visits[state];
     }
     return ok || pl_fail_memory(error, "planning the fronts");

@@ -22,7 +22,7 @@ enum { BINS = 16, DEEP = 64, ALL_AXES = 4096, BLOCK = 512, FEW = 8, PART = 1 << 
 
 
 /* What a node's memory costs, in average areas of the boxes that it is built over: fuller nodes, at most 2 % more visits. */
-#define MEMORY_PRICE 6.0f
+#define MEMORY_PRICE 7.0f
 
 /* Four numbers at once, of which the fourth means nothing. */
 typedef float four __attribute__((vector_size(16)));

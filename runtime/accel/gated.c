@@ -42,8 +42,8 @@ static void work_destroy(void *memory)
 
 static void *work_create(const pl_scene *scene, pl_error *error)
 {
-    (void)scene;
     pl_gated_work *w = calloc(1, sizeof *w);
+    if (w) w->states = &scene->states;
     if (!w) pl_fail_memory(error, "preparing to trace");
     else if (pl_gated_grow_frames(w, 0, error) && pl_gated_grow_stack(w, 0, error)) return w;
     work_destroy(w);
@@ -60,14 +60,14 @@ static size_t list_items(pl_gated_work *w, const pl_front *front, uint32_t opene
     for (uint32_t at = opened; at; at = front->opened[at].parent) count++;
     if (!grow(&w->chain, count, &w->chain_capacity, sizeof *w->chain, error)) return 0;
     w->chain[count - 1] = item;
-    for (size_t i = count - 1; i > 0; opened = front->opened[opened].parent) w->chain[--i] = front->opened[opened].item;
+    for (size_t i = count - 1; i > 0; opened = front->opened[opened].parent)
+        w->chain[--i] = pl_front_item(w->states, front->opened[opened].item);
     return count;
 }
 
 static const pl_item *instance_item(const pl_scene *scene, const pl_front *front, uint32_t instance)
 {
-    const pl_front_instance *it = &front->instances[instance];
-    return pl_front_item(&scene->states, front, it->opened, it->item);
+    return pl_front_item(&scene->states, front->places[instance].item);
 }
 
 /* Maps a ray from a front's state to an item of an opened node, one transformation after another. */
@@ -90,7 +90,7 @@ static bool map_frame(const pl_scene *scene, pl_gated_work *w, uint32_t index, p
         pl_frame *f = &w->frames[from + 1].at;
         memcpy(f->normative_o, parent->normative_o, sizeof f->normative_o);
         memcpy(f->normative_d, parent->normative_d, sizeof f->normative_d);
-        if (!map_down(w, parent->front, parent->front->instances[f->instance].opened,
+        if (!map_down(w, parent->front, parent->front->places[f->instance].opened,
                       instance_item(scene, parent->front, f->instance), f->normative_o, f->normative_d, error))
             return false;
         f->mapped = true;
@@ -128,7 +128,7 @@ static bool place_frame(const pl_scene *scene, pl_gated_work *w, uint32_t index,
         pl_gated_frame *f = &w->frames[from + 1];
         const uint32_t instance = f->at.instance;
         f->place = w->frames[from].place;
-        if (!place_down(scene, w, front, front->instances[instance].opened, instance_item(scene, front, instance),
+        if (!place_down(scene, w, front, front->places[instance].opened, instance_item(scene, front, instance),
                         &f->place, error))
             return false;
         f->placed = true;
@@ -169,7 +169,7 @@ bool pl_gated_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query 
     const pl_gated_frame *f = &w->frames[frame];
     const pl_front *front = f->at.front;
     const pl_front_primitive *primitive = &front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = pl_front_item(&scene->states, front, primitive->opened, primitive->item);
+    const pl_item *item = pl_front_item(&scene->states, primitive->item);
     if (!f->at.mapped && !map_frame(scene, w, frame, query->error)) return false;
     double o[3], d[3];
     memcpy(o, f->at.normative_o, sizeof o);
@@ -207,7 +207,7 @@ int pl_gated_arrive(pl_tracer *tracer, uint32_t frame, uint32_t instance, bool c
     }
     if (!f->placed && !place_frame(scene, w, frame, query->error)) return -1;
     pl_gated_place place = f->place;
-    if (!place_down(scene, w, front, front->instances[instance].opened, item, &place, query->error)) return -1;
+    if (!place_down(scene, w, front, front->places[instance].opened, item, &place, query->error)) return -1;
     pl_arrival arrival = {item->what, place.o, place.d, place.stretch, place.within, depth};
     double t_entry;
     switch (pl_query_gate(query, states, &arrival, &t_entry, &place.within)) {
@@ -235,13 +235,14 @@ static bool trail_items(const pl_scene *scene, const pl_path *trail, pl_items *i
         const bool last = i + 2 == trail->length;
         uint32_t opened, item;
         if (!last || ref >> PL_REF_SHIFT == PL_KIND_INSTANCE) {
-            opened = front->instances[ref & PL_REF_INDEX].opened;
-            item = front->instances[ref & PL_REF_INDEX].item;
+            opened = front->places[ref & PL_REF_INDEX].opened;
+            item = front->places[ref & PL_REF_INDEX].item;
         } else {
             opened = front->primitives[ref & PL_REF_INDEX].opened;
             item = front->primitives[ref & PL_REF_INDEX].item;
         }
-        if (!pl_front_add_items(items, front, opened, pl_front_item(&scene->states, front, opened, item))) return false;
+        if (!pl_front_add_items(items, &scene->states, front, opened, pl_front_item(&scene->states, item)))
+            return false;
     }
     return true;
 }

@@ -68,6 +68,7 @@ typedef struct pl_gated_frame {
 } pl_gated_frame;
 
 typedef struct pl_gated_work {
+    const pl_states *states;
     pl_gated_frame *frames;
     uint64_t *stack;
     const pl_item **chain;

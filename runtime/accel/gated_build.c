@@ -121,22 +121,22 @@ static bool set_gates(building *b, pl_gated_rung *rung, uint32_t opened_count)
     b->gated->bytes += (front->instance_count + 1) * sizeof *links;
     rung->least = INFINITY;
     for (uint32_t i = 0; ok && i < opened_count; i++) {
-        const pl_opened *at = &front->opened[i];
-        ways[i] = at->item ? ways[at->parent] : (way){{1.0, 0, 1, 0}, pl_affine_identity()};
-        if (!at->item) continue;
-        const pl_state *state = &states->list[at->item->what];
-        extend(&ways[i].link, at->item);
-        for (uint32_t k = 0; k < at->item->transform_count; k++)
-            ways[i].to_object = pl_affine_multiply(&at->item->transforms[k]->to_object, &ways[i].to_object);
+        ways[i] = i ? ways[front->opened[i].parent] : (way){{1.0, 0, 1, 0}, pl_affine_identity()};
+        if (i == 0) continue;
+        const pl_item *by = pl_front_item(states, front->opened[i].item);
+        const pl_state *state = &states->list[by->what];
+        extend(&ways[i].link, by);
+        for (uint32_t k = 0; k < by->transform_count; k++)
+            ways[i].to_object = pl_affine_multiply(&by->transforms[k]->to_object, &ways[i].to_object);
         if (state->unbounded) continue;
         rung->least = fmin(rung->least, state->diameter * ways[i].link.stretch);
         farthest = fmin(farthest, farthest_of(state, &ways[i].to_object));
     }
     rung->farthest = in_unit_frame(front, farthest);
     for (uint32_t i = 0; ok && i < front->instance_count; i++) {
-        const pl_front_instance *it = &front->instances[i];
-        links[i] = ways[it->opened].link;
-        extend(&links[i], pl_front_item(states, front, it->opened, it->item));
+        const pl_front_place *at = &front->places[i];
+        links[i] = ways[at->opened].link;
+        extend(&links[i], pl_front_item(states, at->item));
     }
     free(ways);
     return ok || pl_fail_memory(b->error, "building the rungs");
@@ -199,7 +199,7 @@ static bool follow(const building *b, uint64_t most, bool *large, double *bytes)
             large[state] = true;
             ok = pl_front_count(b->compositions, state, most, &counts, &reached, b->error);
             *bytes += sizeof(pl_gated_rung) + (double)counts.primitives * sizeof(pl_front_primitive) +
-                      (double)counts.instances * (sizeof(pl_front_instance) + sizeof(pl_gated_link)) +
+                      (double)counts.instances * (pl_front_instance_bytes(true) + sizeof(pl_gated_link)) +
                       (double)counts.opened * sizeof(pl_opened) +
                       (double)(counts.primitives + counts.instances) * NODE_BYTES_AN_ITEM;
         }
@@ -215,7 +215,7 @@ static double least_bytes(const pl_states *states)
 {
     double bytes = states->count * (double)(sizeof(pl_gated_state) + sizeof(pl_gated_rung) + sizeof(pl_front_node));
     for (uint32_t i = 0; i < states->count; i++)
-        bytes += states->list[i].item_count * (sizeof(pl_front_instance) + sizeof(pl_gated_link) + NODE_BYTES_AN_ITEM);
+        bytes += states->list[i].item_count * (pl_front_instance_bytes(true) + sizeof(pl_gated_link) + NODE_BYTES_AN_ITEM);
     return bytes;
 }
 

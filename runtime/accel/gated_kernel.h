@@ -70,8 +70,8 @@ static inline int gated_descend(pl_tracer *tracer, uint32_t index, uint32_t inst
     const pl_gated_frame *parent = &w->frames[index];
     const pl_front_instance *it = &parent->at.front->instances[instance];
     const pl_gated_link *link = &parent->rung->links[instance];
-    if (query->shadow && it->item & PL_NO_SHADOW) return 0;
-    const pl_gated_state *state = &gated->states[it->front];
+    if (query->shadow && it->front & PL_NO_SHADOW) return 0;
+    const pl_gated_state *state = &gated->states[it->front & ~PL_NO_SHADOW];
     pl_gated_frame *f = &w->frames[index + 1];
     f->rung = &gated->rungs[state->first];
     f->stretch = parent->stretch * link->stretch;
@@ -81,15 +81,9 @@ static inline int gated_descend(pl_tracer *tracer, uint32_t index, uint32_t inst
     f->depth = parent->depth + link->depth;
     f->at.front = &f->rung->front;
     f->at.instance = instance;
-    f->at.error = it->stretch * parent->at.error + (it->gain * parent->at.distance + it->base);
-    f->at.distance = it->stretch * parent->at.distance + it->offset;
-    f->at.t0 = parent->at.t0;
-    f->at.rate = parent->at.rate;
+    double4 o, d;
+    map_into(it, &parent->at, &f->at, &o, &d);
     if (parent->at.blind) *local_max = local_t_max(&f->at, query->t_max);
-    const double4 x = *(const double4 *)it->columns, y = *(const double4 *)(it->columns + 3);
-    const double4 z = *(const double4 *)(it->columns + 6), offset = *(const double4 *)(it->columns + 9);
-    const double4 o = four_fma(x, parent->at.o[0], four_fma(y, parent->at.o[1], four_fma(z, parent->at.o[2], offset)));
-    const double4 d = four_fma(x, parent->at.d[0], four_fma(y, parent->at.d[1], z * parent->at.d[2]));
     tracer->counters.instances++;
     const bool met = begin_frame(&f->at, o, d, query->t_max, local_max);
     if (!met && !state->unbounded) return 0;

@@ -279,6 +279,40 @@ static inline __attribute__((always_inline)) bool begin_frame(pl_frame *f, doubl
     return !told && f->front->root != PL_NOTHING;
 }
 
+/* Three of nine numbers; none beyond them is read. */
+static inline float4 column(const float columns[9], int number)
+{
+    if (number < 2) return *(const float4 *)(columns + 3 * number);
+    const float4 last = *(const float4 *)(columns + 5);
+    return (float4){last[1], last[2], last[3], last[3]};
+}
+
+/* Maps the ray of a frame into an instance (front.h): *o and *d, and what bounds the new frame's error and distance. */
+static inline __attribute__((always_inline)) void map_into(const pl_front_instance *it, const pl_frame *parent, pl_frame *f,
+                                                           double4 *o, double4 *d)
+{
+    const pl_front_bounds *bounds = &parent->front->bounds;
+    /* The fourth number of each means nothing. */
+    const double4 centre = *(const double4 *)it->centre, from = *(const double4 *)parent->o - centre;
+    const float4 x = column(it->columns, 0), y = column(it->columns, 1), z = column(it->columns, 2);
+    double4 a = __builtin_convertvector(x, double4), b = __builtin_convertvector(y, double4);
+    double4 c = __builtin_convertvector(z, double4);
+    if (parent->front->fine) {
+        const float *columns = parent->front->fine[f->instance].columns;
+        a += __builtin_convertvector(column(columns, 0), double4);
+        b += __builtin_convertvector(column(columns, 1), double4);
+        c += __builtin_convertvector(column(columns, 2), double4);
+    }
+    *o = four_fma(a, from[0], four_fma(b, from[1], c * from[2]));
+    *d = four_fma(a, parent->d[0], four_fma(b, parent->d[1], c * parent->d[2]));
+    const float stretch = bounds->stretch * __builtin_sqrtf(sum_of(x * x + y * y + z * z));
+    const float away = sum_of(absolute(__builtin_convertvector(centre, float4)));
+    f->error = stretch * (parent->error + bounds->gain * parent->distance + bounds->base) + bounds->rough;
+    f->distance = stretch * (parent->distance + away);
+    f->t0 = parent->t0;
+    f->rate = parent->rate;
+}
+
 /* Goes into an instance: frame `index` + 1. 0: it misses, 1: it meets the box, 2: only what is unbounded, -1: an error. */
 static inline int descend(pl_tracer *tracer, uint32_t index, uint32_t instance, const pl_query *query, float *local_max)
 {
@@ -287,20 +321,13 @@ static inline int descend(pl_tracer *tracer, uint32_t index, uint32_t instance, 
     if (index + 1 >= w->frame_capacity && !pl_bvh_grow_frames(w, index + 1, query->error)) return -1;
     const pl_frame *parent = &w->frames[index];
     const pl_front_instance *it = &parent->front->instances[instance];
-    if (query->shadow && it->item & PL_NO_SHADOW) return 0;
+    if (query->shadow && it->front & PL_NO_SHADOW) return 0;
     pl_frame *f = &w->frames[index + 1];
-    f->front = &fronts->list[it->front];
+    double4 o, d;
+    f->front = &fronts->list[it->front & ~PL_NO_SHADOW];
     f->instance = instance;
-    f->error = it->stretch * parent->error + (it->gain * parent->distance + it->base);
-    f->distance = it->stretch * parent->distance + it->offset;
-    f->t0 = parent->t0;
-    f->rate = parent->rate;
+    map_into(it, parent, f, &o, &d);
     if (parent->blind) *local_max = local_t_max(f, query->t_max);
-    /* The fourth number of each is the next column's first, and nobody looks at what becomes of it. */
-    const double4 x = *(const double4 *)it->columns, y = *(const double4 *)(it->columns + 3);
-    const double4 z = *(const double4 *)(it->columns + 6), offset = *(const double4 *)(it->columns + 9);
-    const double4 o = four_fma(x, parent->o[0], four_fma(y, parent->o[1], four_fma(z, parent->o[2], offset)));
-    const double4 d = four_fma(x, parent->d[0], four_fma(y, parent->d[1], z * parent->d[2]));
     tracer->counters.instances++;
     if (begin_frame(f, o, d, query->t_max, local_max)) return 1;
     return f->front->unbounded_count ? 2 : 0;

@@ -237,11 +237,11 @@ static bool map_packet(const pl_scene *scene, pl_bvh_work *w, uint32_t index, un
     for (; from < index; from++) {
         const pl_packet_frame *parent = &w->packets[from];
         pl_packet_frame *f = &w->packets[from + 1];
-        const pl_front_instance *it = &parent->front->instances[f->instance];
+        const pl_front_place *it = &parent->front->places[f->instance];
         copy_quads(&f->normative, &parent->normative, quads);
         /* Quads that were mapped before are mapped again to the same numbers. */
         if (!map_lanes_down(w, parent->front, it->opened,
-                            pl_front_item(&scene->states, parent->front, it->opened, it->item), &f->normative, quads, error))
+                            pl_front_item(&scene->states, it->item), &f->normative, quads, error))
             return false;
         f->mapped |= quads;
     }
@@ -255,7 +255,7 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     const pl_scene *scene = tracer->scene;
     const pl_front *front = w->packets[index].front;
     const pl_front_primitive *p = &front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = pl_front_item(&scene->states, front, p->opened, p->item);
+    const pl_item *item = pl_front_item(&scene->states, p->item);
     unsigned quads = 0;
     for (int i = 0; i < QUADS; i++) quads |= (unsigned)((lanes >> 4 * i & 15) != 0) << i;
     if (!map_packet(scene, w, index, quads, queries->error)) return false;
@@ -310,19 +310,29 @@ static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, 
 /* Goes into an instance: frame `index` + 1. */
 static inline void descend_lanes(pl_packet_frame *f, const pl_packet_frame *parent, const pl_front_instance *it)
 {
-    f->error = it->stretch * parent->error + (it->gain * parent->distance + it->base);
-    f->distance = it->stretch * parent->distance + it->offset;
+    const pl_front_bounds *bounds = &parent->front->bounds;
+    const pl_front_fine *fine = parent->front->fine ? &parent->front->fine[f->instance] : NULL;
+    float square = 0.0f, away = 0.0f;
+    double m[9];
+    for (int i = 0; i < 9; i++) {
+        square += it->columns[i] * it->columns[i];
+        m[i] = (double)it->columns[i] + (fine ? (double)fine->columns[i] : 0.0);
+    }
+    for (int axis = 0; axis < 3; axis++) away += (float)__builtin_fabs(it->centre[axis]);
+    const float stretch = bounds->stretch * __builtin_sqrtf(square);
+    f->error = stretch * (parent->error + bounds->gain * parent->distance + bounds->base) + bounds->rough;
+    f->distance = stretch * (parent->distance + away);
     f->t0 = parent->t0;
     f->rate = parent->rate;
     f->mapped = 0;
-    const double *m = it->columns;
     for (int i = 0; i < PL_LANES; i += 4) {
-        const __m256d x = _mm256_loadu_pd(parent->o[0] + i), y = _mm256_loadu_pd(parent->o[1] + i), z = _mm256_loadu_pd(parent->o[2] + i);
+        const __m256d x = _mm256_loadu_pd(parent->o[0] + i) - it->centre[0], y = _mm256_loadu_pd(parent->o[1] + i) - it->centre[1];
+        const __m256d z = _mm256_loadu_pd(parent->o[2] + i) - it->centre[2];
         const __m256d u = _mm256_loadu_pd(parent->d[0] + i), v = _mm256_loadu_pd(parent->d[1] + i), w = _mm256_loadu_pd(parent->d[2] + i);
 #pragma GCC unroll 3
         for (int r = 0; r < 3; r++) {
             const __m256d a = _mm256_set1_pd(m[r]), b = _mm256_set1_pd(m[3 + r]), c = _mm256_set1_pd(m[6 + r]);
-            _mm256_storeu_pd(f->o[r] + i, _mm256_fmadd_pd(a, x, _mm256_fmadd_pd(b, y, _mm256_fmadd_pd(c, z, _mm256_set1_pd(m[9 + r])))));
+            _mm256_storeu_pd(f->o[r] + i, _mm256_fmadd_pd(a, x, _mm256_fmadd_pd(b, y, c * z)));
             _mm256_storeu_pd(f->d[r] + i, _mm256_fmadd_pd(a, u, _mm256_fmadd_pd(b, v, c * w)));
         }
     }
@@ -398,11 +408,11 @@ static bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, d
         } else if (kind == PL_KIND_INSTANCE) {
             const uint32_t instance = ref & PL_REF_INDEX;
             const pl_front_instance *it = &f->front->instances[instance];
-            if (shadow && it->item & PL_NO_SHADOW) continue;
+            if (shadow && it->front & PL_NO_SHADOW) continue;
             if (!pl_bvh_grow_packets(w, index + 1, error)) return false;
             f = &w->packets[index];
             pl_packet_frame *inner = f + 1;
-            inner->front = &fronts->list[it->front];
+            inner->front = &fronts->list[it->front & ~PL_NO_SHADOW];
             inner->instance = w->frames[index + 1].instance = instance;
             w->frames[index + 1].front = inner->front;
             tracer->counters.instances++;
