@@ -94,7 +94,7 @@ HABITS: tuple[Habit, ...] = (
     # operators and operands of rules
     _row(_RULES, r"\b(\w+)(?:\([^()]*\))?\s*->(?:(?!\belse\b|\bif\b|->|;).)*?\b(?!\1\b)\w+\)?\s*(?P<at>->)\s*[\w(\[]", "a rule has one '->'", "'+' joins what it produces", "+"),
     _row(_RULES, rf"(?P<at>\[\s*({_NUMBER}(?:\s+{_NUMBER}|\s*,\s*{_NUMBER}){{2}})\s*\])", "the name of an operation stands before its numbers", mend=r"[ trans \2 ]"),
-    _row(_RULES, rf"(?P<at>\[\s*{_NUMBER}(?:[\s,]+{_NUMBER})*\s*\])", "the name of an operation stands before its numbers", "write [ trans 0 0 1 ], or [ scale 0.5 ]"),
+    _row(_RULES, rf"(?:{_ARROW}|[+(\]])\s*(?P<at>\[\s*{_NUMBER}(?:[\s,]+{_NUMBER})*\s*\])", "the name of an operation stands before its numbers", "write [ trans 0 0 1 ], or [ scale 0.5 ]"),
     _row(_RULES, rf"{_ARROW}\s*(?P<at>(\w+\s*[-+*/]?=(?![=>])\s*{_NUMBER}))(?=\s*[A-Za-z_(\[])", "what changes a parameter stands in square brackets", mend=r"[ \2 ]"),
     _row(_RULES, rf"(?P<at>\(\s*({_OPERATION}[^()\[\]{{}};]*)\))", "operators with arguments stand in square brackets", mend=r"[ \2 ]"),
     _row(_RULES, rf"(?:{_ARROW}|\+)?\s*(?P<at>\{{\s*((?:{_OPERATION}|--|\+\+|\w+\s*[-+*/]?=(?![=>]))[^{{}}\[\]]*?)\s*\}})\s*[\w(\[]",
@@ -106,7 +106,7 @@ HABITS: tuple[Habit, ...] = (
     _row(_RULES, rf"(?:^|[{{;])\s*(?P<at>{_ARROW})", r"the name of a Selection stands before '\0'", "a rule looks like Name -> operators operand + …;", code="missing"),
     _row(_RULES, rf"(?P<at>({_PRIMITIVE})\s+({_NUMBER}|\"_*\"))", "arguments stand in brackets", mend=r"\2(\3)"),
     _row(_RULES, r"(?P<at>\bmesh\s*\(\s*([\w./-]+\.\w+)\s*\))", "a file's name stands in quotation marks", mend=r'mesh("\2")'),
-    _row(_RULES, rf"(?P<at>\b([A-Za-z_]\w*)\s+({_NUMBER}(?:[\s,]+{_NUMBER})*))\s*(?=[;|+)]|$)", "arguments stand in brackets",
+    _row(_RULES, rf"(?P<at>\b(?!{_OPERATION})([A-Za-z_]\w*)\s+({_NUMBER}(?:[\s,]+{_NUMBER})*))\s*(?=[;|+)]|$)", "arguments stand in brackets",
          mend=lambda text: _with_commas(re.sub(r"\s+", "(", text, count=1) + ")")),
     _row(_RULES, rf"(?P<at>\b(\w+)\s*[\[<]\s*({_VALUE}(?:\s*,\s*{_VALUE})+|{_NUMBER})\s*[\]>])", "arguments stand in round brackets", mend=r"\2(\3)"),
     _row(_RULES, r"(?P<at>(?!if\b)\b(\w+)\s+\(([^();]*[\d,*/%-][^();]*)\))", "a space stands between a symbol and its arguments", mend=r"\2(\3)"),
