@@ -2,7 +2,7 @@
 
 Requests with what changed in a scene's files → :class:`Answer`\\ s with messages, insights and the forecast of the parts
 that this touched (parts.py). A part may have blocks of several files. What an edit touched comes first, and a request that
-waits is looked at after each part: the latest text never waits for an older one.
+waits is looked at after each part, or even in the middle of a forecast: the latest text hardly waits for an older one.
 
 Example::
 
@@ -15,7 +15,9 @@ from __future__ import annotations
 
 import gc
 import pickle
+import signal
 import time
+from _thread import interrupt_main
 from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
@@ -30,6 +32,7 @@ from ..reading.source import Span
 from . import telling
 from .exchange import Answer, Request
 from .facts import drop_facts, facts_of
+from .interruption import Interrupted, Interruption
 from .parts import Part, Parts
 from .split import Shape
 from .text import Block
@@ -144,6 +147,7 @@ class Work:
     def __init__(self) -> None:
         self.scenes: dict[int, SceneState] = {}
         self._due: dict[int, None] = {}  # scenes with parts that are to be checked, the last one first to come
+        self.interruption = Interruption()
 
     def take(self, request: Request) -> None:
         for number in request.forget:
@@ -158,8 +162,8 @@ class Work:
         return not self._due
 
     def go_on(self, answer: Callable[[Answer], None], must_pause: Callable[[], bool] = lambda: False) -> None:
-        """Check what is due, up to where all is known or, after a part, ``must_pause``; each ``answer`` holds what is
-        known since the one before."""
+        """Check what is due, up to where all is known or, after a part, ``must_pause`` (or the work was interrupted); each
+        ``answer`` holds what is known since the one before."""
         while self._due:
             number = next(reversed(self._due))
             if not self._check(self.scenes[number], answer, must_pause):
@@ -176,9 +180,8 @@ class Work:
         self.take(request)
         self.go_on(answer)
 
-    @staticmethod
-    def _check(scene: SceneState, answer: Callable[[Answer], None], must_pause: Callable[[], bool]) -> bool:
-        """False after a pause was made."""
+    def _check(self, scene: SceneState, answer: Callable[[Answer], None], must_pause: Callable[[], bool]) -> bool:
+        """False where something is left."""
         from ..pipeline import deep_nesting
 
         began = told_at = time.perf_counter()
@@ -186,7 +189,7 @@ class Work:
         is_all_told = is_paused = False
         with deep_nesting(scene.request.files[0].name):
             order, places = scene.in_order(), scene.places()
-            for part in _steps(scene, order):
+            for part in _steps(scene, order, self.interruption):
                 now = time.perf_counter()
                 if part is not None:
                     new[part] = None
@@ -199,12 +202,12 @@ class Work:
                     return False
             if not is_all_told:
                 answer(telling.answer(scene, scene.request, places, new))
-        return True
+        return not any(map(_is_due, scene.parts))
 
 
-def _steps(scene: SceneState, order: dict[Block, int]) -> Iterator[Part | None]:
+def _steps(scene: SceneState, order: dict[Block, int], interruption: Interruption) -> Iterator[Part | None]:
     """Works out what is due: first of what an edit touched, then of other parts, those that changed last first. Yields each
-    part of which more is known, and None where it should be told."""
+    part of which more is known (or might be, but for the ``interruption``), and None where it should be told."""
     every = list(scene.parts)
     for parts in (scene.fresh, [every[0], *reversed(every[1:])]):
         for part in parts:
@@ -214,7 +217,7 @@ def _steps(scene: SceneState, order: dict[Block, int]) -> Iterator[Part | None]:
         yield None
         for part in parts:
             if part.outcome.model is not None:
-                _predict(part.outcome)
+                _predict(part.outcome, interruption)
                 yield part
         if any(map(_is_due, every)):
             yield None
@@ -263,20 +266,24 @@ def _checked(scene: SceneState, part: Part, order: dict[Block, int]) -> Outcome:
     return Outcome(found, is_broken, None if diagnostics.has_errors else model)
 
 
-def _predict(outcome: Outcome) -> None:
-    """Work out forecast and insights."""
+def _predict(outcome: Outcome, interruption: Interruption) -> None:
+    """Work out forecast and insights, unless interrupted."""
     from ..graph.forecast import forecast
     from ..graph.insights import insights
     from ..pipeline import build_graph
 
-    model, outcome.model = outcome.model, None
-    if model is None:
-        return
     try:
-        outcome.insights = insights(model)
-        outcome.forecast = forecast(build_graph(model, is_verified=False))
-    except (PlsysError, RecursionError):
+        with interruption.allowed():
+            found = insights(outcome.model)
+            outcome.insights = found
+            outcome.forecast = forecast(build_graph(outcome.model, is_verified=False))
+    except Interrupted:
+        outcome.insights = None
         return
+    except (PlsysError, RecursionError):
+        outcome.model = None
+        return
+    outcome.model = None
     outcome.diagnostics += outcome.forecast.diagnostics
 
 
@@ -292,8 +299,11 @@ def main() -> None:
         try:
             while True:
                 requests.put(pickle.load(stream))
+                interrupt_main(signal.SIGINT)
         except EOFError:
             requests.put(None)
+
+    signal.signal(signal.SIGINT, work.interruption.interrupt)
 
     def send(answer: Answer) -> None:
         output.write(pickle.dumps(answer))

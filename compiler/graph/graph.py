@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
+from functools import cache
 
 from ..reading.model import Assign, Expression, Mesh, Record, Step, TextureValue, Variants
 from ..reading.source import Span
@@ -30,14 +31,22 @@ class Node:
     def children(self) -> tuple[int, ...]:
         """The nodes that this one refers to, in the order of derivation (an Enter's symbol is one)."""
         found: list[int] = []
-        for f in fields(self):
-            if f.name in ("child", "body", "then", "otherwise", "symbol"):
-                found.append(getattr(self, f.name))
-            elif f.name == "children_":
-                found.extend(self.children_)
-            elif f.name == "cases":
-                found.extend(body for _, body in self.cases)
+        for name in _references(type(self)):
+            value = getattr(self, name)
+            if name == "children_":
+                found.extend(value)
+            elif name == "cases":
+                found.extend(body for _, body in value)
+            else:
+                found.append(value)
         return tuple(found)
+
+
+@cache
+def _references(kind: type[Node]) -> tuple[str, ...]:
+    """The fields of a kind of nodes that refer to others, in the order of derivation."""
+    names = ("child", "body", "then", "otherwise", "symbol", "children_", "cases")
+    return tuple(each.name for each in fields(kind) if each.name in names)
 
 
 @dataclass(slots=True)

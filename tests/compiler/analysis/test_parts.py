@@ -8,6 +8,7 @@ import pytest
 from plsys.compiler.analysis import Project, check_whole
 from plsys.compiler.analysis.checking import Work
 from plsys.compiler.analysis.whole import Result, Snapshot
+from plsys.compiler.graph.insights import insights as make_insights
 from plsys.compiler.pipeline import diagnose
 from plsys.compiler.reading.nearest import NameIndex, nearest, nearest_of
 from plsys.compiler.reading.source import Source
@@ -133,6 +134,27 @@ def test_the_latest_text_comes_before_what_is_left_of_an_earlier_one():
     assert answers[-1].more and answers[-1].findings  # n1 isn't counted down
     work.go_on(answers.append)
     assert not answers[-1].more and work.is_done
+
+
+def test_a_forecast_that_is_interrupted_is_made_later(monkeypatch):
+    project, work = Project(), Work()
+    scene = project.scene_of(project.open(None, SCENE.encode(), name="x"))
+    calls: list = []
+
+    def interrupted_once(model):
+        calls.append(model)
+        if len(calls) == 2:
+            work.interruption.interrupt()
+        return make_insights(model)
+
+    monkeypatch.setattr("plsys.compiler.graph.insights.insights", interrupted_once)
+    answers: list = []
+    work.take(Snapshot.of(scene, 0).request)
+    work.go_on(answers.append, lambda: len(calls) == 2)
+    assert not work.is_done and answers[-1].more and answers[-1].forecast is None
+    work.go_on(answers.append)
+    assert work.is_done and answers[-1].forecast["primitives"] == 3 * 4
+    work.interruption.interrupt()  # where nothing is at work, nothing happens
 
 
 def test_a_slice_leaves_the_rest_for_later():

@@ -1,0 +1,42 @@
+"""Work that a signal may interrupt, and only there.
+
+A worker's other thread raises the signal when it has news; what is interrupted must leave nothing half done.
+
+Example::
+
+    interruption = Interruption()
+    signal.signal(signal.SIGINT, interruption.interrupt)
+    try:
+        with interruption.allowed():
+            result = takes_long()
+    except Interrupted:
+        ...                             # there is news: look at it first
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import Iterator
+
+
+class Interrupted(Exception):
+    """Raised in the middle of work that is allowed to be interrupted."""
+
+
+class Interruption:
+    def __init__(self) -> None:
+        self._is_allowed = False
+
+    @contextmanager
+    def allowed(self) -> Iterator[None]:
+        self._is_allowed = True
+        try:
+            yield
+        finally:
+            self._is_allowed = False
+
+    def interrupt(self, *_: object) -> None:
+        """The signal's handler."""
+        if self._is_allowed:
+            self._is_allowed = False
+            raise Interrupted
