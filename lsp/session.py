@@ -20,7 +20,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, Callable
 
-from plsys.compiler.analysis import Checker, Document, Folders, Found, Result, prepare_format
+from plsys.compiler.analysis import Checker, Document, Folders, Found, Result, prepare_format, prepare_messages
 
 from . import features
 from .progress import Progress
@@ -354,7 +354,10 @@ class Session:
 
     def prepare(self) -> bool:
         """Do for a moment, in a pause, what a request would have to wait for; whether nothing is left of that."""
-        return self.has_work or all(prepare_format(document, SLICE) for document in list(self.workspace.uris))
+        if self.has_work:
+            return True
+        prepare_messages()
+        return all(prepare_format(document, SLICE) for document in list(self.workspace.uris))
 
     def _later(self, take: Callable[[Any], None], what: Any) -> None:
         """Have ``work`` take in what a worker found. In any thread."""

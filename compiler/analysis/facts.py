@@ -105,6 +105,13 @@ def facts_of(block: Block) -> Facts:
     return found
 
 
+def prepare_messages() -> None:
+    """Load what only texts with mistakes need (some milliseconds), before the first mistake is typed."""
+    import difflib  # noqa: F401
+
+    from ..reading import habits  # noqa: F401
+
+
 def drop_facts(block: Block) -> None:
     """Let go of what was read from a block that is gone. Syntax nodes name their block and the block has them: that
     would be garbage in cycles at every key, and the search for it takes longer than a key may."""
