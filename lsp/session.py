@@ -250,6 +250,7 @@ class Session:
                             "registerOptions": {"watchers": watchers}}
             self.ask("client/registerCapability", {"registrations": [registration]})
         self.workspace.scans.scan(self.workspace.folders.values())
+        prepare_messages()
 
     def _exit(self, params: dict) -> None:
         self.exit_code = 0 if self._shut_down else 1
@@ -354,10 +355,7 @@ class Session:
 
     def prepare(self) -> bool:
         """Do for a moment, in a pause, what a request would have to wait for; whether nothing is left of that."""
-        if self.has_work:
-            return True
-        prepare_messages()
-        return all(prepare_format(document, SLICE) for document in list(self.workspace.uris))
+        return self.has_work or all(prepare_format(document, SLICE) for document in list(self.workspace.uris))
 
     def _later(self, take: Callable[[Any], None], what: Any) -> None:
         """Have ``work`` take in what a worker found. In any thread."""
