@@ -20,6 +20,8 @@ enum { DEFAULT_CACHE = 1 << 20, LARGE_FRONT = 1 << 14, MOST_THREADS = 64 };
 /* What there may be at once while building: a process that traces takes SPARE more than its scene anyway. */
 #define SPARE (256 << 10)
 #define MOST_AT_ONCE 1.05
+/* Where fronts became too large, the next ones are planned for a little less than what would have fitted. */
+#define SHRINK 0.99
 
 /* --- the budget --- */
 
@@ -36,9 +38,9 @@ static double building_bytes(const pl_scene *scene, const pl_compositions *compo
 }
 
 /* A plan for what the scene's options ask for: so many items; as much as fits into `memory`; or what pays, as far as the
- * cache reaches. */
-static bool choose(const pl_scene *scene, const pl_compositions *compositions, pl_fronts *fronts, pl_front_plan **plan,
-                   pl_error *error)
+ * cache reaches. share: of what there is for fronts, so much is planned with, since plans are estimates. */
+static bool choose(const pl_scene *scene, const pl_compositions *compositions, double share, pl_fronts *fronts,
+                   pl_front_plan **plan, pl_error *error)
 {
     const pl_options *options = &scene->options;
     const double primitives = (double)scene->states.list[0].primitives;
@@ -50,7 +52,7 @@ static bool choose(const pl_scene *scene, const pl_compositions *compositions, p
     double budget = cache_bytes() - (double)states;
     if (fill) {
         const double at_once = MOST_AT_ONCE * (double)options->memory + SPARE - building_bytes(scene, compositions);
-        budget = fmin((double)options->memory, at_once) - (double)states;
+        budget = share * (fmin((double)options->memory, at_once) - (double)states);
     }
     if (primitives * sizeof(pl_front_primitive) < budget) {
         if (!pl_front_plan_items(*plan, UINT64_MAX, error)) return false;
@@ -70,7 +72,7 @@ static bool choose(const pl_scene *scene, const pl_compositions *compositions, p
     pl_pilot_free(&pilot);
     if (!ok || fits) return ok;
     if (!fill) return pl_front_plan_budget(*plan, LEAST_GROWTH * floor, false, &floor, &fits, error);
-    const double needed = (double)states + floor;
+    const double needed = (double)states + floor / share;
     const double at_once = (building_bytes(scene, compositions) + needed - SPARE) / MOST_AT_ONCE;
     return pl_fail(error, PL_ERROR_LIMIT, "memory", "this scene needs at least %.0f KB; %.0f KB are allowed",
                    fmax(needed, at_once) / 1024.0 + 1.0, (double)options->memory / 1024.0);
@@ -235,13 +237,22 @@ bool pl_front_count(pl_compositions *compositions, uint32_t state, uint64_t most
     return ok || pl_fail_memory(error, "planning the fronts");
 }
 
-bool pl_fronts_build(pl_scene *scene, pl_error *error)
+/* Frees the fronts, but not what is known of the pilot. */
+static void clear(pl_fronts *fronts)
 {
-    pl_fronts *fronts = scene->structure = calloc(1, sizeof *fronts);
-    if (!fronts) return pl_fail_memory(error, "building the fronts");
+    for (uint32_t i = 0; i < fronts->count && fronts->list; i++) pl_front_free(&fronts->list[i]);
+    free(fronts->list);
+    fronts->list = NULL;
+    fronts->count = 0;
+    fronts->items = fronts->nodes = fronts->opened = fronts->instances = fronts->most_items = 0;
+    fronts->node_bytes = fronts->item_bytes = 0;
+}
+
+static bool build_planned(const pl_scene *scene, const pl_compositions *compositions, double share, pl_fronts *fronts,
+                          pl_error *error)
+{
     pl_front_plan *plan = NULL;
-    pl_compositions *compositions = pl_compositions_create(&scene->states, error);
-    bool ok = compositions && choose(scene, compositions, fronts, &plan, error);
+    bool ok = choose(scene, compositions, share, fronts, &plan, error);
     if (ok && !list_fronts(fronts, plan)) ok = pl_fail_memory(error, "building the fronts");
     ok = ok && build_fronts(scene, plan, fronts, error);
     for (uint32_t i = 0; ok && i < fronts->count; i++)
@@ -249,6 +260,25 @@ bool pl_fronts_build(pl_scene *scene, pl_error *error)
     fronts->bytes = sizeof *fronts + fronts->count * sizeof *fronts->list + fronts->node_bytes + fronts->item_bytes;
     fronts->entries = ok ? plan->entries : 0.0;
     pl_front_plan_free(plan);
+    return ok;
+}
+
+/* As many fronts as are asked for; again with less where they became larger than planned and than `memory`. */
+bool pl_fronts_build(pl_scene *scene, pl_error *error)
+{
+    pl_fronts *fronts = scene->structure = calloc(1, sizeof *fronts);
+    if (!fronts) return pl_fail_memory(error, "building the fronts");
+    const pl_options *options = &scene->options;
+    pl_compositions *compositions = pl_compositions_create(&scene->states, error);
+    size_t states;
+    bool ok = compositions && pl_states_packed_bytes(&scene->states, &states, error);
+    for (double share = 1.0; ok;) {
+        ok = build_planned(scene, compositions, share, fronts, error);
+        const double room = (double)options->memory - (double)states;
+        if (!options->memory || options->front_items || (double)fronts->bytes <= room) break;
+        share *= SHRINK * room / (double)fronts->bytes;
+        if (ok) clear(fronts);
+    }
     pl_compositions_free(compositions);
     return ok && pl_states_pack(&scene->states, error);
 }
@@ -258,8 +288,7 @@ void pl_fronts_destroy(pl_scene *scene)
     pl_fronts *fronts = scene->structure;
     scene->structure = NULL;
     if (!fronts) return;
-    for (uint32_t i = 0; i < fronts->count && fronts->list; i++) pl_front_free(&fronts->list[i]);
-    free(fronts->list);
+    clear(fronts);
     free(fronts);
 }
 
