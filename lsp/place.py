@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Iterable, Iterator, NamedTuple
 
-from plsys.compiler.analysis import Context, Document, Scene, facts_of, syntax, vocabulary
+from plsys.compiler.analysis import Context, Document, Scene, facts_of, vocabulary
 
 from . import prose, snippets
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from ..reading import syntax
 from ..reading.diagnostics import Diagnostics
-from ..reading.resolve_names import Problem
+from ..reading.problems import Problem
 from ..reading.source import Span
 from .resolving import BlockResolver
 from .scene import Scene

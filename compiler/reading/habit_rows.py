@@ -88,6 +88,7 @@ HABITS: tuple[Habit, ...] = (
     _row(_TOP, r"^\s*(?P<at>(\w+)(?:\([^()]*\))?\s*(?:->|=>|→)[^;{}\r\n]*;?)", "a rule stands in a Selection", r"write Selection \2 { \2 -> …; }",
          lambda text: f"Selection {re.match(r'[A-Za-z0-9_]+', text)[0]} {{ {text.rstrip(';')}; }}"),
     _row(_RULES, r"(?P<at>(\d+(?:\.\d+)?)\s*%)\s*:", "a weight is a number without '%'", mend=r"\2"),
+    _row(_RULES, r"(?:->|\|)\s*(?P<at>-\s*)\d[\d.]*\s*:", "a weight can't be negative", "remove the sign", ""),
     _row(_RULES, r"(?:->|\|)\s*(?P<at>\(\s*(\d+(?:\.\d+)?)\s*\)\s*)(?=[\w\[])", "a weight is followed by ':'", mend=r"\2: "),
     _row(_RULES, r"(?:->|\|)\s*(?P<at>(\d+(?:\.\d+)?))\s+\w[^;]*\||\|\s*(\d+(?:\.\d+)?)\s+\w", "a weight is followed by ':'",
          "write A -> 3: x | 1: y;"),

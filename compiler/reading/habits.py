@@ -30,6 +30,8 @@ _VAGUE = re.compile(
     "|stands where a rule|in brackets|commas stand between|nothing to act on|no name"
 )
 _MASKED = re.compile(rb'"[^"\r\n]*"|//[^\r\n]*|/\*.*?(?:\*/|\Z)', re.DOTALL)
+# Python's quotient, which hides the statement's end in a comment.
+_FLOOR = re.compile(r"[-+*/(=,\s](([\w.]+|\([^()\r\n]*\))//([\w.]+|\([^()\r\n]*\)))[^\r\n]*[;\])}]", re.ASCII)
 _LINE_END = re.compile(r"[\r\n]|\Z")
 _HEAD = re.compile(
     r"\b(?:Selection|Calculation|Transformation|Parameter|Texture)\b|^(?:#[ \t]*)?\w+", re.MULTILINE
@@ -106,6 +108,11 @@ def _habit_at(text: _Text, item: Diagnostic) -> tuple[Diagnostic, tuple[int, int
     """The message for the habit that an item comes from, and from where to where it explains all that is wrong."""
     offset = item.span.start
     context, (low, high) = text.context(offset), text.window(offset)
+    if context in ("rules", "statements") and (found := _FLOOR.search(text.data[low:high].decode("latin-1"))):
+        span = Span(text.source, low + found.start(1), low + found.end(1))
+        mend = f"floor({found[2]}/{found[3]})"
+        message = Diagnostic("syntax", "error", "'//' starts a comment", span, f"write {mend}", mend=mend)
+        return message, (low, high)
     for habit in HABITS:
         if context not in habit.where:
             continue

@@ -20,10 +20,11 @@ from typing import Callable
 from . import meshes, syntax
 from .diagnostics import Diagnostics, nearest
 from .model import Constant, Input, Mesh, Model, Record, SceneObject
+from .problems import Problem
 from .resolve_blocks import Blocks, Values
 from .resolve_expressions import BLOCKS, INPUTS, Expressions, Value
 from .resolve_items import Items
-from .resolve_names import ARTICLES, OBJECT_BLOCKS, Entry, Names, Problem
+from .resolve_names import ARTICLES, OBJECT_BLOCKS, Entry, Names
 from .resolve_objects import Objects, split
 from .resolve_operators import Operators
 from .resolve_rules import Rules

@@ -11,9 +11,10 @@ from typing import Sequence
 from . import affine, syntax
 from .diagnostics import Note
 from .model import Constant, Record
+from .problems import Problem
 from .resolve_expressions import BLOCKS, Expressions
 from .resolve_items import Items
-from .resolve_names import Names, Problem
+from .resolve_names import Names
 from .resolve_textures import TRANSFORMATIONS, Textures
 from .source import Span
 from .vocabulary import PROPERTIES, Row

@@ -18,7 +18,8 @@ from typing import Callable, Sequence
 from . import syntax, vocabulary
 from .evaluate import NotFinite, fold
 from .model import Apply, Constant, Expression, Read
-from .resolve_names import Entry, Names, Problem
+from .problems import Problem
+from .resolve_names import Entry, Names
 from .source import Span
 
 BINARY = {

@@ -17,8 +17,8 @@ from typing import Sequence
 from . import syntax, vocabulary
 from .diagnostics import Diagnostics, nearest
 from .model import Constant, Expression
+from .problems import Problem, unsupported
 from .resolve_expressions import Expressions, Scope, Value
-from .resolve_names import Problem, unsupported
 from .source import Span
 from .vocabulary import Row
 

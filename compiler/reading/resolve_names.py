@@ -19,6 +19,7 @@ from typing import Callable, Iterable, Iterator, Sequence, TypeVar
 from . import syntax, vocabulary
 from .diagnostics import Diagnostics, Note, nearest
 from .model import Definition
+from .problems import Problem, synonym, truth, unsupported
 from .source import Source, Span
 
 T = TypeVar("T")
@@ -48,28 +49,6 @@ ARTICLES = {
 OBJECT_BLOCKS = (
     "object union sphere box cylinder cone plane torus triangle smooth_triangle disc mesh".split()
 )  # fmt: skip
-
-
-class Problem(Exception):
-    """Ends the resolution of one construct. Without a code it has been reported already."""
-
-    def __init__(
-        self,
-        code: str = "",
-        span: Span | None = None,
-        message: str = "",
-        hint: str = "",
-        notes: Iterable[Note] = (),
-        mend: str | None = None,
-    ) -> None:
-        super().__init__(message)
-        self.code, self.span, self.message, self.hint, self.notes = code, span, message, hint, tuple(notes)
-        self.mend = mend
-
-    def report(self, diagnostics: Diagnostics) -> None:
-        if self.code:
-            assert self.span is not None
-            diagnostics.add(self.code, self.span, self.message, self.hint, self.notes, self.mend)
 
 
 @dataclass
@@ -266,9 +245,8 @@ class Names:
             return Problem("wrong-kind", name.span, message, hint)
         if name.name in vocabulary.UNSUPPORTED:
             return unsupported(name)
-        if (truth := _TRUTHS.get(name.name.lower())) is not None and "constant" in kinds:
-            message = f"plsys has no '{name.name}'"
-            return Problem("unknown-name", name.span, message, f"write {truth}: 0 is false, the rest is true", mend=truth)
+        if (found := truth(name, wanted)) is not None and "constant" in kinds:
+            return found
         hint = synonym(name.name, kinds) or self.nearest(name.name, kinds) or self.nearest(name.name, None)
         return Problem(
             "unknown-name", name.span, f"unknown name '{name.name}': {wanted} is needed here", hint
@@ -290,22 +268,6 @@ def vocabulary_names(kind: str) -> Iterable[str]:
         "constant": vocabulary.CONSTANTS,
         "colour": vocabulary.COLOURS,
     }.get(kind, ())
-
-
-def synonym(name: str, kinds: tuple[str, ...]) -> str:
-    """A hint that names what plsys calls it, where another program's name stands."""
-    ours = vocabulary.SYNONYMS.get(name.lower(), "")
-    return f"did you mean '{ours}'?" if ours and vocabulary.kind_of(ours) in kinds else ""
-
-
-_TRUTHS = {"true": "1", "yes": "1", "on": "1", "false": "0", "no": "0", "off": "0"}
-
-
-def unsupported(name: syntax.Name) -> Problem:
-    """What to say of a POV-Ray feature that plsys doesn't have."""
-    hint = vocabulary.UNSUPPORTED[name.name]
-    mend = _TRUTHS.get(name.name)
-    return Problem("unsupported", name.span, f"POV-Ray's '{name.name}' isn't supported", hint, mend=mend)
 
 
 def assigned_names(node: syntax.Definition) -> Iterator[syntax.Name]:

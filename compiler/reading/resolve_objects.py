@@ -15,9 +15,10 @@ from typing import Callable
 from . import syntax
 from .meshes import build
 from .model import Enter, Mesh, MeshLeaf, NoShadow, Operand, Operator, Paint, Prefixed, Sum, Transform
+from .problems import Problem
 from .resolve_expressions import ARGUMENTS, BLOCKS, Expressions
 from .resolve_items import Items
-from .resolve_names import OBJECT_BLOCKS, Entry, Names, Problem
+from .resolve_names import OBJECT_BLOCKS, Entry, Names
 from .resolve_shapes import corners, shape
 from .resolve_terms import Terms
 from .resolve_textures import TRANSFORMATIONS, Look, Textures

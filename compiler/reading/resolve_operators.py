@@ -9,8 +9,9 @@ from __future__ import annotations
 from . import syntax, vocabulary
 from .diagnostics import nearest
 from .model import Apply, Assign, Calculate, Constant, Expression, Operator, Read, Step, Transform, Variants
+from .problems import Problem, synonym
 from .resolve_expressions import RULES, Expressions
-from .resolve_names import ARTICLES, Entry, Names, Problem, synonym
+from .resolve_names import ARTICLES, Entry, Names
 
 UPDATES = {"+=": "add", "-=": "subtract", "*=": "multiply", "/=": "divide", "++": "add", "--": "subtract"}
 

@@ -12,8 +12,8 @@ from typing import Callable
 from . import affine
 from .affine import Vector
 from .model import Constant, Operand, Prefixed, Primitive, Step, Transform
+from .problems import Problem
 from .resolve_items import Items
-from .resolve_names import Problem
 from .source import Span
 
 

@@ -26,8 +26,9 @@ from .model import (
     Primitive,
     Sum,
 )
+from .problems import Problem
 from .resolve_expressions import RULES, Expressions, Scope
-from .resolve_names import Entry, Names, Problem, terms_of
+from .resolve_names import Entry, Names, terms_of
 from .resolve_operators import Operators
 from .resolve_textures import Textures
 from .source import Span

@@ -15,9 +15,10 @@ from typing import Sequence
 from . import affine, syntax, vocabulary
 from .diagnostics import nearest
 from .model import Apply, Constant, Expression, Paint, Read, Step, TextureValue
+from .problems import Problem
 from .resolve_expressions import BLOCKS, TEXTURES, Expressions, Scope, Value
 from .resolve_items import Items, check_range
-from .resolve_names import Entry, Names, Problem
+from .resolve_names import Entry, Names
 from .source import Span
 from .vocabulary import MODIFIERS, PROPERTIES
 

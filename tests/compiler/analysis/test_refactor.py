@@ -25,7 +25,7 @@ def derivation(text: str) -> tuple[list[str], np.ndarray]:
     """Kinds and matrices of all primitives, in order."""
     batches = list(unfold(build(Source.from_text(text)).graph))
     kinds = [str(kind) for batch in batches for kind in batch.kinds]
-    return kinds, np.concatenate([batch.matrix for batch in batches])
+    return kinds, np.concatenate([np.zeros((0, 3, 4)), *(batch.matrix.reshape(-1, 3, 4) for batch in batches)])
 
 
 def same_derivation(before: str, after: str) -> bool:

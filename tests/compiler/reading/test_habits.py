@@ -80,6 +80,9 @@ EXAMPLES = [
     both(rule, "A -> box -> sphere;", "A -> box + sphere;"),
     both(rule, "A -> [0, 0, 1] box;", "A -> [ trans 0, 0, 1 ] box;"),
     both(rule, "A -> [0.5] box;", None),
+    both(rule, "A -> -1: box | 2: sphere;", "A -> 1: box | 2: sphere;"),
+    both(rule, "[ n = 7//2 ] A; A -> [ scale n ] box;", "[ n = floor(7/2) ] A; A -> [ scale n ] box;"),
+    both(statement, "n = (m + 1)//k;", "n = floor((m + 1)/k);"),
     both(rule, "A -> n = 2 box;", "A -> [ n = 2 ] box;"),
     # conditions and expressions
     both(rule, "if (n =< 0) A -> box;", "if (n <= 0) A -> box;"),
@@ -193,6 +196,11 @@ def test_a_number_is_not_torn_apart():
 def test_a_habit_in_a_comment_or_a_text_is_none():
     (said,) = parse(Source.from_text('Selection A { A -> box; } @ // A --> box\nParameter p = 1 "A --> box";'))[1].items
     assert said.message == "the character '@' has no meaning here"
+
+
+def test_a_comment_behind_a_value_is_no_quotient():
+    for text in ("Calculation C { n = 7 // 2; }", "Calculation C { n = 7 //2;\n}", "Selection A { A -> box // 2 }"):
+        assert not [each for each in parse(Source.from_text(text))[1].items if "comment" in each.message]
 
 
 def test_long_broken_lines_are_read_in_time():
