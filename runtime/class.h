@@ -20,10 +20,12 @@
 #define PL_CLASS_H
 
 #include "cut.h"
+#include "hull.h"
 #include "interval.h"
 
 typedef struct pl_bounds {
     pl_box box;
+    pl_hull hull; /* of what stands in the box */
     pl_reach reach;
     uint64_t count; /* primitives; UINT64_MAX: draws decide, or unknown */
     bool unbounded; /* nothing is known, or a shape has no bounds */
@@ -62,8 +64,9 @@ double pl_covers_of(pl_covers *covers, uint32_t symbol, const pl_scope *scope, c
 pl_bounds pl_bounds_nothing(void);
 pl_bounds pl_bounds_unknown(void);
 
-/* Bounds of a shape in its own frame. */
-void pl_bounds_of_leaf(const pl_box *box, bool unbounded, pl_bounds *bounds);
+/* Bounds of a leaf in its own frame: of a box; of a shape, whose arguments lie between two. */
+void pl_bounds_of_box(const pl_box *box, pl_bounds *bounds);
+void pl_bounds_of_shape(const pl_shape *shape, const double *low, const double *high, pl_bounds *bounds);
 
 /* Of both, or of one of them. */
 void pl_bounds_join(pl_bounds *a, const pl_bounds *b, bool alternative);

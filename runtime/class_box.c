@@ -3,25 +3,46 @@
 
 pl_bounds pl_bounds_nothing(void)
 {
-    return (pl_bounds){.box = pl_box_empty()};
+    return (pl_bounds){.box = pl_box_empty(), .hull = pl_hull_empty()};
 }
 
 pl_bounds pl_bounds_unknown(void)
 {
-    return (pl_bounds){pl_box_everything(), {INFINITY, INFINITY, INFINITY}, UINT64_MAX, true};
+    const pl_box everything = pl_box_everything();
+    return (pl_bounds){everything, pl_hull_of_box(&everything), {INFINITY, INFINITY, INFINITY}, UINT64_MAX, true};
 }
 
-void pl_bounds_of_leaf(const pl_box *box, bool unbounded, pl_bounds *bounds)
+void pl_bounds_of_box(const pl_box *box, pl_bounds *bounds)
 {
     bounds->box = *box;
+    bounds->hull = pl_hull_of_box(box);
     bounds->count = 1;
-    bounds->unbounded = unbounded || !(pl_box_is_empty(box) || pl_box_is_finite(box));
+    bounds->unbounded = !(pl_box_is_empty(box) || pl_box_is_finite(box));
     bounds->reach = pl_reach_leaf(pl_box_is_finite(box) ? 1.7320508075688774 * pl_box_reach(box) : 0.0);
+}
+
+/* Radii of cones and tori are what isn't known exactly. */
+void pl_bounds_of_shape(const pl_shape *shape, const double *low, const double *high, pl_bounds *bounds)
+{
+    pl_box box = pl_box_everything();
+    if (!shape->support) {
+        pl_bounds_of_box(&box, bounds);
+        return;
+    }
+    box = pl_shape_box(shape, low, NULL);
+    const pl_box other = pl_shape_box(shape, high, NULL);
+    const pl_hull hull = pl_hull_of_shape(shape, high);
+    pl_box_join(&box, &other);
+    if (low != high) pl_box_widen(&box);
+    pl_bounds_of_box(&box, bounds);
+    bounds->hull = pl_hull_of_shape(shape, low);
+    pl_hull_join(&bounds->hull, &hull);
 }
 
 void pl_bounds_join(pl_bounds *a, const pl_bounds *b, bool alternative)
 {
     pl_box_join(&a->box, &b->box);
+    pl_hull_join(&a->hull, &b->hull);
     pl_reach_join(&a->reach, &b->reach);
     a->unbounded = a->unbounded || b->unbounded;
     if (alternative) a->count = a->count == b->count ? a->count : UINT64_MAX;
@@ -40,17 +61,18 @@ void pl_box_widen(pl_box *box)
     }
 }
 
-/* A box turned again and again grows, though what is in it doesn't: so the distance from the frame's origin is followed as
- * well (reach.size), which turning leaves alone, and each bounds the other. */
+/* Box, hull and the distance from the frame's origin (reach.size), which turning leaves alone, are followed each for
+ * itself, and each bounds the others. */
 static void tighten(pl_bounds *bounds)
 {
-    double square = 0.0, size = bounds->reach.size * (1.0 + 1e-12);
-    pl_box *box = &bounds->box;
-    if (pl_box_is_empty(box)) return;
+    if (pl_box_is_empty(&bounds->box)) return;
+    const pl_hull ball = pl_hull_of_ball(bounds->reach.size * (1.0 + 1e-12)), block = pl_hull_of_box(&bounds->box);
+    pl_hull_meet(&bounds->hull, &ball);
+    pl_hull_meet(&bounds->hull, &block);
+    bounds->box = pl_hull_box(&bounds->hull);
+    double square = 0.0;
     for (int axis = 0; axis < 3; axis++) {
-        box->lo[axis] = fmax(box->lo[axis], -size);
-        box->hi[axis] = fmin(box->hi[axis], size);
-        double far = fmax(fabs(box->lo[axis]), fabs(box->hi[axis]));
+        double far = fmax(fabs(bounds->box.lo[axis]), fabs(bounds->box.hi[axis]));
         square += far * far;
     }
     bounds->reach.size = fmin(bounds->reach.size, sqrt(square) * (1.0 + 1e-12));
@@ -80,6 +102,7 @@ void pl_bounds_through(const pl_transform *transform, bool whole, pl_bounds *bou
 {
     bounds->reach = pl_reach_through(transform, &bounds->reach);
     if (!bounds->unbounded) pl_box_through(transform, &bounds->box);
+    if (!bounds->unbounded && !whole && !pl_box_is_empty(&bounds->box)) pl_hull_through(&transform->to_parent, &bounds->hull);
     if (!pl_box_is_empty(&bounds->box) && !pl_box_is_finite(&bounds->box)) bounds->unbounded = true;
     if (!bounds->unbounded && !whole) tighten(bounds);
 }
@@ -108,6 +131,7 @@ void pl_bounds_through_range(const pl_range_map *map, pl_bounds *bounds)
     }
     bounds->box = box;
     pl_box_widen(&bounds->box);
+    pl_hull_through_range(map, &bounds->hull);
     if (!pl_box_is_finite(&bounds->box)) bounds->unbounded = true;
     else tighten(bounds);
 }

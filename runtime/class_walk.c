@@ -224,24 +224,15 @@ static step branch(pl_class_walk *w, uint32_t *node)
     return GO_ON;
 }
 
-/* A shape whose arguments aren't known exactly: radii of cones and tori lie between those at the ends. */
 static step bound_primitive(pl_class_walk *w, const pl_node *it, pl_bounds *bounds)
 {
-    const pl_shape *shape = pl_shape_of(it->as.primitive.shape);
     double low[PL_SHAPE_ARGUMENTS] = {0}, high[PL_SHAPE_ARGUMENTS] = {0};
-    pl_box box = pl_box_everything();
     if (!run(w, it->as.primitive.code)) return nothing_known(w);
-    if (shape->support) {
-        for (uint32_t i = 0; i < w->result.count && i < PL_SHAPE_ARGUMENTS; i++) {
-            low[i] = w->result.values[i].lo;
-            high[i] = w->result.values[i].hi;
-        }
-        box = pl_shape_box(shape, low, NULL);
-        pl_box other = pl_shape_box(shape, high, NULL);
-        pl_box_join(&box, &other);
-        pl_box_widen(&box);
+    for (uint32_t i = 0; i < w->result.count && i < PL_SHAPE_ARGUMENTS; i++) {
+        low[i] = w->result.values[i].lo;
+        high[i] = w->result.values[i].hi;
     }
-    pl_bounds_of_leaf(&box, !shape->support, bounds);
+    pl_bounds_of_shape(pl_shape_of(it->as.primitive.shape), low, high, bounds);
     return RESULT;
 }
 
@@ -278,7 +269,7 @@ static step descend(pl_class_walk *w, uint32_t *node, pl_bounds *bounds)
         return RESULT; /* of nothing yet: the first subtree is taken on the way up */
     case PL_NODE_ENTER: return enter_symbol(w, node, bounds);
     case PL_NODE_PRIMITIVE: return bound_primitive(w, it, bounds);
-    case PL_NODE_MESH: pl_bounds_of_leaf(pl_mesh_box(w->meshes[it->as.mesh.mesh]), false, bounds); return RESULT;
+    case PL_NODE_MESH: pl_bounds_of_box(pl_mesh_box(w->meshes[it->as.mesh.mesh]), bounds); return RESULT;
     case PL_NODE_OBJECT: return nothing_known(w);
     default: *node = it->as.no_shadow.child; return GO_ON;
     }

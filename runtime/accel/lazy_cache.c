@@ -114,11 +114,9 @@ static void bound(pl_unfolder *u, pl_classes *classes, draft *d)
         d->gate = pl_bounds_gate(&bounds);
         if (u->scene->gates) bounds.reach = d->gate.reach;
     } else if (item->kind == PL_NODE_MESH) {
-        pl_bounds_of_leaf(pl_mesh_box(u->scene->meshes[item->what]), false, &bounds);
+        pl_bounds_of_box(pl_mesh_box(u->scene->meshes[item->what]), &bounds);
     } else {
-        const pl_shape *shape = pl_shape_of(item->what);
-        pl_box box = shape->support ? pl_shape_box(shape, item->arguments, NULL) : pl_box_everything();
-        pl_bounds_of_leaf(&box, !shape->support, &bounds);
+        pl_bounds_of_shape(pl_shape_of(item->what), item->arguments, item->arguments, &bounds);
     }
     const bool whole = u->scene->gates && item->kind == PL_NODE_ENTER;
     for (size_t i = item->transform_count; i-- > 0;)

@@ -1,0 +1,47 @@
+/* hull.h - convex bounds: how far a set reaches in 26 directions, those to the neighbours of a cell in a cubic lattice.
+ *
+ * A box that is turned again and again grows each time, though what is in it doesn't. The support h(v), the largest
+ * v · p over the points p of the set, is known here in directions of components -1, 0 and 1, and bounded in all others:
+ * with |v|'s components in falling order a, b, c, v is (a-b) times a direction to a face, (b-c) times one to an edge and c times one
+ * to a corner, and a support is no more than the sum of those of its parts (Rockafellar, Convex Analysis, section 13). So a set can be
+ * mapped without being wrapped in boxes, also by a map of which only ranges are known: h is convex, hence largest at
+ * a corner of the range of v.
+ *
+ *     pl_hull hull = pl_hull_of_box(&box);
+ *     pl_hull_through(&map, &hull);                 of the set mapped
+ *     pl_box smaller = pl_hull_box(&hull);
+ *
+ * Of bounded sets only. All bounds are rounded outward. */
+#ifndef PL_HULL_H
+#define PL_HULL_H
+
+#include "box.h"
+#include "interval.h"
+#include "shapes/shape.h"
+
+enum { PL_HULL_CELLS = 27, PL_HULL_MIDDLE = 13 };
+
+/* support[9 (x + 1) + 3 (y + 1) + z + 1] in direction (x, y, z); the middle isn't used. */
+typedef struct pl_hull {
+    double support[PL_HULL_CELLS];
+} pl_hull;
+
+pl_hull pl_hull_empty(void);
+pl_hull pl_hull_of_box(const pl_box *box);
+
+/* A shape with a support function, in its own frame. */
+pl_hull pl_hull_of_shape(const pl_shape *shape, const double *arguments);
+
+/* Of both sets; of what is in both. */
+void pl_hull_join(pl_hull *hull, const pl_hull *other);
+void pl_hull_meet(pl_hull *hull, const pl_hull *other);
+
+/* A ball about the origin. */
+pl_hull pl_hull_of_ball(double radius);
+
+void pl_hull_through(const pl_affine *to_parent, pl_hull *hull);
+void pl_hull_through_range(const pl_range_map *map, pl_hull *hull);
+
+pl_box pl_hull_box(const pl_hull *hull);
+
+#endif
