@@ -28,6 +28,8 @@ typedef struct pl_bounds {
     pl_hull hull; /* of what stands in the box */
     pl_reach reach;
     uint64_t count; /* primitives; UINT64_MAX: draws decide, or unknown */
+    uint64_t fewest; /* primitives that there are whatever is drawn */
+    bool hollow; /* a state may have no primitive: this one, or one below */
     bool unbounded; /* nothing is known, or a shape has no bounds */
 } pl_bounds;
 

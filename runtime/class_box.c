@@ -3,20 +3,26 @@
 
 pl_bounds pl_bounds_nothing(void)
 {
-    return (pl_bounds){.box = pl_box_empty(), .hull = pl_hull_empty()};
+    return (pl_bounds){.box = pl_box_empty(), .hull = pl_hull_empty(), .hollow = false};
 }
 
 pl_bounds pl_bounds_unknown(void)
 {
     const pl_box everything = pl_box_everything();
-    return (pl_bounds){everything, pl_hull_of_box(&everything), {INFINITY, INFINITY, INFINITY}, UINT64_MAX, true};
+    return (pl_bounds){.box = everything,
+                       .hull = pl_hull_of_box(&everything),
+                       .reach = {INFINITY, INFINITY, INFINITY},
+                       .count = UINT64_MAX,
+                       .hollow = true,
+                       .unbounded = true};
 }
 
 void pl_bounds_of_box(const pl_box *box, pl_bounds *bounds)
 {
     bounds->box = *box;
     bounds->hull = pl_hull_of_box(box);
-    bounds->count = 1;
+    bounds->count = bounds->fewest = 1;
+    bounds->hollow = false;
     bounds->unbounded = !(pl_box_is_empty(box) || pl_box_is_finite(box));
     bounds->reach = pl_reach_leaf(pl_box_is_finite(box) ? 1.7320508075688774 * pl_box_reach(box) : 0.0);
 }
@@ -45,6 +51,8 @@ void pl_bounds_join(pl_bounds *a, const pl_bounds *b, bool alternative)
     pl_hull_join(&a->hull, &b->hull);
     pl_reach_join(&a->reach, &b->reach);
     a->unbounded = a->unbounded || b->unbounded;
+    a->hollow = a->hollow || b->hollow;
+    a->fewest = !alternative ? pl_add_saturating(a->fewest, b->fewest) : a->fewest < b->fewest ? a->fewest : b->fewest;
     if (alternative) a->count = a->count == b->count ? a->count : UINT64_MAX;
     else a->count = pl_add_saturating(a->count, b->count);
 }

@@ -306,11 +306,15 @@ static bool ascend(pl_class_walk *w, pl_bounds *bounds, bool fresh, uint32_t *no
     case PL_NODE_TRANSFORM_CODE: {
         const pl_range_map *map = (const pl_range_map *)w->maps.data + l->map;
         pl_bounds_through_range(map, bounds);
-        if (!(map->inverse_stretch < INFINITY)) bounds->count = UINT64_MAX; /* may be singular and dropped */
+        if (!(map->inverse_stretch < INFINITY)) { /* may be singular and dropped */
+            bounds->count = UINT64_MAX;
+            bounds->fewest = 0;
+        }
         break;
     }
     case PL_NODE_ENTER: {
         cell *c = cell_at(w, l->cell);
+        bounds->hollow = bounds->hollow || bounds->fewest == 0;
         c->bounds = *bounds;
         c->busy = false;
         c->done = w->work;

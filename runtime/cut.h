@@ -58,6 +58,12 @@ pl_gate pl_gate_at(const pl_gate_box *box, const double o[3], const double d[3],
                    const pl_footprint *footprint, pl_span within, double t_min, double t_max, double *t_entry,
                    pl_span *inside);
 
+/* What of a span is within a box, widened by a slack: nothing if `enter` > `leave`. */
+pl_span pl_span_clip(const pl_box *box, const double o[3], const double d[3], double slack, pl_span within);
+
+/* *inside of an open gate. */
+pl_span pl_span_below(const pl_gate_box *gate, const double o[3], const double d[3], pl_span within);
+
 /* The same for a shared state. stretch: the product of the stretches on the path. within: the span above, at first that of the whole scene's box
  * (pl_span_in of state 0) within the ray's t_min and INFINITY.
  * t_max only saves work. Where the gate is open, *inside is the span for what stands below. */

@@ -103,21 +103,43 @@ static double support_along(const pl_hull *hull, double reach, const double v[3]
     return sum + ROUNDINGS * reach * a[most];
 }
 
+/* The support in direction d of the set mapped. */
+static double support_under(const pl_affine *to_parent, const pl_hull *hull, double reach, const double d[3])
+{
+    const double *m = to_parent->m;
+    double v[3], move = 0.0, size = 0.0;
+    for (int axis = 0; axis < 3; axis++) {
+        v[axis] = d[0] * m[axis] + d[1] * m[4 + axis] + d[2] * m[8 + axis];
+        move += d[axis] * m[4 * axis + 3];
+        /* Not |v|: its terms may have cancelled each other out. */
+        size += fabs(d[axis]) * (fabs(m[4 * axis + 3]) + reach * (fabs(m[4 * axis]) + fabs(m[4 * axis + 1]) + fabs(m[4 * axis + 2])));
+    }
+    return support_along(hull, reach, v) + move + ROUNDINGS * size;
+}
+
 void pl_hull_through(const pl_affine *to_parent, pl_hull *hull)
 {
     const pl_hull below = *hull;
-    const double *m = to_parent->m, reach = reach_of(&below);
+    const double reach = reach_of(&below);
     for (int i = 0; i < PL_HULL_CELLS; i++) {
-        double d[3], v[3], move = 0.0, size = 0.0;
+        double d[3];
         direction_of(i, d);
-        for (int axis = 0; axis < 3; axis++) {
-            v[axis] = d[0] * m[axis] + d[1] * m[4 + axis] + d[2] * m[8 + axis];
-            move += d[axis] * m[4 * axis + 3];
-            /* Not |v|: its terms may have cancelled each other out. */
-            size += fabs(d[axis]) * (fabs(m[4 * axis + 3]) + reach * (fabs(m[4 * axis]) + fabs(m[4 * axis + 1]) + fabs(m[4 * axis + 2])));
-        }
-        hull->support[i] = support_along(&below, reach, v) + move + ROUNDINGS * size;
+        hull->support[i] = support_under(to_parent, &below, reach, d);
     }
+}
+
+pl_box pl_hull_box_under(const pl_affine *to_parent, const pl_hull *hull)
+{
+    const double reach = reach_of(hull);
+    pl_box box;
+    for (int axis = 0; axis < 3; axis++) {
+        double d[3] = {0.0, 0.0, 0.0};
+        d[axis] = -1.0;
+        box.lo[axis] = -support_under(to_parent, hull, reach, d);
+        d[axis] = 1.0;
+        box.hi[axis] = support_under(to_parent, hull, reach, d);
+    }
+    return box;
 }
 
 void pl_hull_through_range(const pl_range_map *map, pl_hull *hull)
@@ -125,22 +147,25 @@ void pl_hull_through_range(const pl_range_map *map, pl_hull *hull)
     const pl_hull below = *hull;
     const double reach = reach_of(&below);
     for (int i = 0; i < PL_HULL_CELLS; i++) {
-        double d[3], largest = -INFINITY;
+        double d[3], lo[4], hi[4], size = 0.0, largest = -INFINITY;
         direction_of(i, d);
-        pl_range v[4];
         for (int column = 0; column < 4; column++) {
-            v[column] = pl_range_of(0.0);
-            for (int r = 0; r < 3; r++)
-                v[column] = pl_range_add(v[column], pl_range_multiply(pl_range_of(d[r]), map->m[4 * r + column]));
+            lo[column] = hi[column] = 0.0;
+            for (int r = 0; r < 3; r++) {
+                const pl_range entry = map->m[4 * r + column];
+                if (d[r] == 0.0) continue;
+                lo[column] += d[r] > 0.0 ? entry.lo : -entry.hi;
+                hi[column] += d[r] > 0.0 ? entry.hi : -entry.lo;
+                size += (column == 3 ? 1.0 : reach) * fmax(fabs(entry.lo), fabs(entry.hi));
+            }
         }
         for (int corner = 0; corner < 8; corner++) {
-            const double at[3] = {corner & 1 ? v[0].hi : v[0].lo, corner & 2 ? v[1].hi : v[1].lo, corner & 4 ? v[2].hi : v[2].lo};
-            const bool again = (corner & 1 && v[0].lo == v[0].hi) || (corner & 2 && v[1].lo == v[1].hi) ||
-                               (corner & 4 && v[2].lo == v[2].hi);
+            const double at[3] = {corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1], corner & 4 ? hi[2] : lo[2]};
+            const bool again = (corner & 1 && lo[0] == hi[0]) || (corner & 2 && lo[1] == hi[1]) || (corner & 4 && lo[2] == hi[2]);
             if (!again) largest = fmax(largest, support_along(&below, reach, at));
         }
-        const double sum = largest + v[3].hi;
-        hull->support[i] = isnan(sum) ? INFINITY : sum + ROUNDINGS * (fabs(largest) + fabs(v[3].hi));
+        const double sum = largest + hi[3] + ROUNDINGS * size;
+        hull->support[i] = isnan(sum) ? INFINITY : sum;
     }
 }
 

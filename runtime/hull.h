@@ -44,4 +44,7 @@ void pl_hull_through_range(const pl_range_map *map, pl_hull *hull);
 
 pl_box pl_hull_box(const pl_hull *hull);
 
+/* The box of the set mapped. */
+pl_box pl_hull_box_under(const pl_affine *to_parent, const pl_hull *hull);
+
 #endif

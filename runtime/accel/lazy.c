@@ -1,8 +1,11 @@
 /* lazy.c - bvh where there are too many states to build: they are unfolded when a ray comes to them (lazy.h).
  *
- * A frame is an instance on the way from the root, with its state pinned; an entry of the stack is an item of a frame that is
+ * A frame is an instance on the way from the root, with its state; an entry of the stack is an item of a frame that is
  * still to be visited. Entries are visited depth first, near ones first, so frames form a stack as well. Boxes only
- * filter, so neither what is in the cache nor how loose the classes' boxes are shows in a hit. */
+ * filter, so neither what is in the cache nor how loose the classes' boxes are shows in a hit.
+ *
+ * With a cut-off nearly all gates are clearly open: larger than the footprint where the ray leaves the box. Spans (cut.h)
+ * and hashes of paths are found only where one isn't. */
 #include "lazy.h"
 
 #include <stdlib.h>
@@ -16,19 +19,16 @@
 #define MOST_WORK (UINT64_C(1) << 24)
 enum { MOST_UNKNOWN = PL_LIMIT_DEPTH + 1024 };
 
-/* Frames from the end that pin their states: a path may be longer than the cache is large. */
-enum { PINNED = 16 };
-
 /* Frames are the instances on one path from the root, so frame i is the parent of frame i + 1. */
 typedef struct frame {
-    pl_lazy_state *state; /* NULL: not pinned any more */
+    pl_lazy_state *state; /* NULL: its half of the cache is gone */
     uint32_t symbol, terms; /* terms on the path up to here */
     uint32_t item;          /* of the frame before, by which this one was reached */
+    bool spanned;           /* `inside` is known */
     size_t scope;           /* in `scopes`: what the state is found by again */
     double o[3], d[3];
-    double stretch; /* with cut-offs: the product of stretches, the hash of the path and the span (cut.h) */
-    uint64_t hash;
-    pl_span inside;
+    double stretch; /* with cut-offs: the product of stretches */
+    pl_span inside; /* of what stands below */
 } frame;
 
 typedef struct pending {
@@ -38,14 +38,16 @@ typedef struct pending {
 
 typedef struct work {
     pl_unfolder *unfolder;
+    pl_lazy_half *half;
+    pl_footprint footprint; /* the query's; without a cut-off 0: then all gates are clearly open */
     frame *frames;
     pending *stack;
     uint64_t *scopes;
     pl_path path; /* to the last frame */
     size_t frame_count, frame_capacity, stack_count, stack_capacity, scope_capacity;
     size_t scope_words;
-    uint64_t spent; /* for this ray */
-    uint32_t unknown;
+    uint64_t spent, found; /* for this ray */
+    uint32_t unknown, changes; /* of the half */
 } work;
 
 static void work_destroy(void *memory)
@@ -83,15 +85,38 @@ static bool grow(void *array, size_t count, size_t *capacity, size_t element, pl
     return true;
 }
 
-static void leave(frame *f)
+/* Whether a gate so large is open wherever on the ray it is met up to `to`; in the order of pl_gate_at's roundings. */
+static inline bool is_open(const work *w, double size, double to)
 {
-    if (f->state) pl_lazy_release(f->state);
-    f->state = NULL;
+    return size > w->footprint.width + w->footprint.spread * to;
 }
 
-static void leave_frames(work *w, size_t count)
+/* [t_min, t_max] within a box; nothing if `enter` > `leave`. */
+static inline pl_span clip(const pl_slab *slab, const float planes[6], double t_min, double t_max)
 {
-    while (w->frame_count > count) leave(&w->frames[--w->frame_count]);
+    pl_span span = {t_min, t_max};
+    for (int axis = 0; axis < 3; axis++) {
+        const double lo = (double)planes[axis], hi = (double)planes[3 + axis];
+        const double t_near = ((slab->negative[axis] ? hi : lo) - slab->near_origin[axis]) * slab->inverse[axis];
+        const double t_far = ((slab->negative[axis] ? lo : hi) - slab->far_origin[axis]) * slab->inverse[axis];
+        span.enter = t_near > span.enter ? t_near : span.enter;
+        span.leave = t_far < span.leave ? t_far : span.leave;
+    }
+    return span;
+}
+
+/* The same within an item's content. What is cut below and drawn as its box has content in it and is no larger than a
+ * footprint, so it stands no farther out of the content than that. */
+static inline pl_span clip_content(const work *w, const frame *f, const pl_slab *slab, const pl_lazy_item *it, pl_span span)
+{
+    const double footprint = w->footprint.width + w->footprint.spread * span.leave;
+    const float room = pl_round_up(footprint / f->stretch * (1.0 + 0x1p-20));
+    float planes[6];
+    for (int axis = 0; axis < 3; axis++) {
+        planes[axis] = atomic_load_explicit(&it->enter->content[axis], memory_order_relaxed) - room;
+        planes[3 + axis] = atomic_load_explicit(&it->enter->content[3 + axis], memory_order_relaxed) + room;
+    }
+    return clip(slab, planes, span.enter, span.leave);
 }
 
 /* Pushes the items that the ray meets, the nearest last. */
@@ -100,24 +125,25 @@ static bool push_items(work *w, uint32_t index, pl_query *query, pl_counters *co
     const frame *f = &w->frames[index];
     const pl_lazy_state *state = f->state;
     const size_t first = w->stack_count;
-    pl_slab slab = pl_slab_of(f->o, f->d, pl_reach_slack(&state->reach, f->o));
+    const pl_slab slab = pl_slab_of(f->o, f->d, pl_reach_slack(&state->reach, f->o));
     for (uint32_t i = 0; i < state->item_count; i++) {
         const pl_lazy_item *it = &state->items[i];
-        double t_entry = query->t_min;
-        if (query->shadow && it->item.no_shadow) continue;
+        pl_span span = {query->t_min, query->t_max};
+        if (query->shadow && it->no_shadow) continue;
         if (!it->unbounded) {
             counters->box_tests++;
-            const pl_box box = pl_lazy_box(it);
-            if (pl_box_is_empty(&box)) continue;
-            if (!pl_slab_hits(&slab, &box, query->t_min, query->t_max, &t_entry)) {
+            if (!(it->box[0] <= it->box[3])) continue;
+            span = clip(&slab, it->box, span.enter, span.leave);
+            if (span.enter <= span.leave && it->enter && it->enter->shrinks) span = clip_content(w, f, &slab, it, span);
+            if (!(span.enter <= span.leave)) {
                 if (index > counters->miss_depth) counters->miss_depth = index;
                 continue;
             }
         }
         if (!grow(&w->stack, w->stack_count, &w->stack_capacity, sizeof *w->stack, query->error)) return false;
         size_t place = w->stack_count++;
-        for (; place > first && w->stack[place - 1].t_entry < t_entry; place--) w->stack[place] = w->stack[place - 1];
-        w->stack[place] = (pending){t_entry, index, i};
+        for (; place > first && w->stack[place - 1].t_entry < span.enter; place--) w->stack[place] = w->stack[place - 1];
+        w->stack[place] = (pending){span.enter, index, i};
     }
     return true;
 }
@@ -139,45 +165,84 @@ static bool keep_scope(work *w, const uint64_t *scope, size_t *place, pl_error *
     return true;
 }
 
-/* The state of a frame, unfolded again where it was let go. */
-static const pl_lazy_state *pin(pl_tracer *tracer, frame *f, pl_error *error)
+/* The span for what stands below a frame: each within that of the frame before. */
+static pl_span span_of(work *w, size_t index)
+{
+    size_t known = index;
+    while (!w->frames[known].spanned) known--;
+    for (size_t i = known + 1; i <= index; i++) {
+        frame *f = &w->frames[i];
+        const pl_lazy_item *it = &w->frames[i - 1].state->items[f->item];
+        f->inside = pl_span_below(&it->enter->gate, f->o, f->d, w->frames[i - 1].inside);
+        f->spanned = true;
+    }
+    return w->frames[index].inside;
+}
+
+/* Lets all states go for an empty half of the cache. */
+static void change(pl_tracer *tracer)
 {
     work *w = tracer->work;
-    bool is_new;
-    if (!f->state)
-        f->state = pl_lazy_get(tracer->scene->structure, w->unfolder, f->symbol,
-                               f->symbol == UINT32_MAX ? NULL : w->scopes + f->scope, &w->spent, &is_new, error);
+    if (tracer->scene->gates && w->frame_count) span_of(w, w->frame_count - 1);
+    for (size_t i = 0; i < w->frame_count; i++) w->frames[i].state = NULL;
+    w->half = pl_lazy_change(tracer->scene->structure, w->half);
+    w->changes++;
+}
+
+/* The state of a scope, unfolded; NULL: an error. */
+static pl_lazy_state *get(pl_tracer *tracer, uint32_t symbol, const uint64_t *scope, pl_error *error)
+{
+    work *w = tracer->work;
+    for (;;) {
+        bool full;
+        pl_lazy_state *state = pl_lazy_get(tracer->scene->structure, w->half, w->unfolder, symbol, scope, &w->spent, &full, error);
+        if (!full) return state;
+        change(tracer);
+    }
+}
+
+/* The state of a frame, found again where it was let go. */
+static pl_lazy_state *state_of(pl_tracer *tracer, size_t index, pl_error *error)
+{
+    work *w = tracer->work;
+    frame *f = &w->frames[index];
+    if (!f->state) f->state = get(tracer, f->symbol, f->symbol == UINT32_MAX ? NULL : w->scopes + f->scope, error);
     return f->state;
 }
 
-/* The last frame's state is new: what is known of its items is known of those above. */
+/* What was learnt of the last frame's items is known of those above. */
 static void shrink(work *w)
 {
     for (size_t i = w->frame_count - 1; i > 0 && w->frames[i].state && w->frames[i - 1].state; i--)
-        if (!pl_lazy_shrink(&w->frames[i - 1].state->items[w->frames[i].item], w->frames[i].state)) return;
+        if (!pl_lazy_shrink(w->frames[i - 1].state->items[w->frames[i].item].enter, w->frames[i].state)) return;
 }
 
-/* Goes into an instance whose ray stands in f; terms: of the path to it. */
-static bool enter(pl_tracer *tracer, uint32_t symbol, const uint64_t *scope, const frame *as, pl_query *query)
+/* Goes into an instance whose ray stands in f: by an item of the last frame, or the scene itself (NULL). */
+static bool enter(pl_tracer *tracer, const pl_lazy_item *it, const frame *as, pl_query *query)
 {
     work *w = tracer->work;
     frame f = *as;
-    bool is_new;
+    f.symbol = it ? it->what : UINT32_MAX;
     if (w->frame_count > PL_LIMIT_DEPTH)
-        return pl_fail_at(query->error, PL_ERROR_LIMIT, tracer->scene->program, symbol,
+        return pl_fail_at(query->error, PL_ERROR_LIMIT, tracer->scene->program, f.symbol,
                           "depth: a ray came %d symbols deep, which is the limit; does the recursion end?", PL_LIMIT_DEPTH);
     if (!grow(&w->frames, w->frame_count, &w->frame_capacity, sizeof *w->frames, query->error) ||
-        !keep_scope(w, scope, &f.scope, query->error))
+        !keep_scope(w, it ? it->enter->scope : NULL, &f.scope, query->error))
         return false;
-    f.symbol = symbol;
-    f.state = pl_lazy_get(tracer->scene->structure, w->unfolder, symbol, scope, &w->spent, &is_new, query->error);
-    if (!f.state) return false;
-    if (w->frame_count >= PINNED) leave(&w->frames[w->frame_count - PINNED]);
+    f.state = it ? atomic_load_explicit(&it->enter->state, memory_order_acquire) : NULL;
+    w->found += f.state != NULL;
     w->frames[w->frame_count++] = f;
-    /* With a cut-off an instance may be drawn as its whole box, however little stands in it. */
-    if (is_new && !tracer->scene->gates) shrink(w);
+    if (!f.state) {
+        const uint32_t changes = w->changes;
+        pl_lazy_state *state = state_of(tracer, w->frame_count - 1, query->error);
+        if (!state) return false;
+        if (it && w->changes == changes) {
+            atomic_store_explicit(&it->enter->state, state, memory_order_release);
+            shrink(w);
+        }
+    }
     if (w->spent > MOST_WORK)
-        return fail_work(tracer->scene, symbol, "needed to visit more nodes of the graph than", MOST_WORK, query->error);
+        return fail_work(tracer->scene, f.symbol, "needed to visit more nodes of the graph than", MOST_WORK, query->error);
     return push_items(w, (uint32_t)w->frame_count - 1, query, &tracer->counters);
 }
 
@@ -188,7 +253,7 @@ static bool write_path(const void *context, pl_path *path)
 }
 
 /* The path to an item of the last frame. */
-static bool extend_path(work *w, const pl_item *item, pl_error *error)
+static bool extend_path(work *w, const pl_lazy_item *item, pl_error *error)
 {
     uint32_t length = w->frames[w->frame_count - 1].terms;
     for (uint32_t i = 0; i < item->term_count; i++)
@@ -197,23 +262,37 @@ static bool extend_path(work *w, const pl_item *item, pl_error *error)
     return true;
 }
 
-/* The gate of an instance whose ray stands in f, with the stretch above it. */
-static pl_gate pass_gate(pl_tracer *tracer, const pl_lazy_item *it, frame *f, pl_query *query, bool *ok)
+/* Decides at a gate that isn't clearly open, of an instance whose ray stands in f; where it is cut, offers its box. */
+static pl_gate decide(pl_tracer *tracer, const pl_lazy_item *it, frame *f, pl_query *query, bool *ok)
+{
+    work *w = tracer->work;
+    const pl_span within = span_of(w, w->frame_count - 1);
+    pl_arrival at = {0, f->o, f->d, f->stretch, within, (uint32_t)w->frame_count};
+    double t_entry;
+    const pl_gate gate = pl_gate_at(&it->enter->gate, f->o, f->d, f->stretch, &query->footprint, within, query->t_min,
+                                    query->t_max, &t_entry, &f->inside);
+    f->spanned = gate == PL_GATE_OPEN;
+    if (gate != PL_GATE_CUT || !(t_entry < query->t_max)) return gate;
+    pl_leaf leaf = {.path = write_path, .source = w};
+    const uint64_t hash = pl_cut_hash(0, w->path.terms, w->path.length);
+    const double coverage = pl_lazy_coverage(w->unfolder, it->what, it->enter->scope, f->d);
+    *ok = pl_query_cut_box(query, &it->enter->gate, coverage, &at, hash, t_entry, &leaf);
+    return gate;
+}
+
+/* Whether an instance is to be gone into whose ray stands in f, with the stretch above it. */
+static bool pass_gate(pl_tracer *tracer, const pl_lazy_item *it, frame *f, pl_query *query, bool *ok)
 {
     const work *w = tracer->work;
-    const pl_item *item = &it->item;
-    for (uint32_t i = 0; i < item->transform_count; i++) f->stretch *= item->transforms[i]->stretch;
-    pl_arrival at = {0, f->o, f->d, f->stretch, f->inside, (uint32_t)w->frame_count};
-    double t_entry;
-    pl_gate gate = pl_gate_at(it->gate, f->o, f->d, f->stretch, &query->footprint, f->inside, query->t_min, query->t_max,
-                              &t_entry, &f->inside);
-    if (gate == PL_GATE_MISSED) return gate;
-    f->hash = pl_cut_hash(f->hash, item->terms, item->term_count);
-    if (gate == PL_GATE_OPEN || !(t_entry < query->t_max)) return gate;
-    pl_leaf leaf = {.path = write_path, .source = w};
-    double coverage = pl_lazy_coverage(w->unfolder, item->what, it->scope, f->d);
-    *ok = pl_query_cut_box(query, it->gate, coverage, &at, f->hash, t_entry, &leaf);
-    return gate;
+    const pl_gate_box *gate = &it->enter->gate;
+    f->spanned = false;
+    if (!tracer->scene->gates) return true;
+    for (uint32_t i = 0; i < it->transform_count; i++) f->stretch *= it->enter->stretches[i];
+    if (gate->unbounded) return true;
+    const pl_span all = {query->t_min, query->t_max};
+    const pl_span own = pl_span_clip(&gate->box, f->o, f->d, pl_reach_slack(&gate->reach, f->o), all);
+    if (!(own.enter <= own.leave)) return false;
+    return is_open(w, gate->diameter * f->stretch, own.leave) || decide(tracer, it, f, query, ok) == PL_GATE_OPEN;
 }
 
 /* An item of the last frame. */
@@ -221,27 +300,24 @@ static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
 {
     work *w = tracer->work;
     const pl_scene *scene = tracer->scene;
-    frame *parent = &w->frames[at->frame];
-    const pl_lazy_state *state = pin(tracer, parent, query->error);
+    const pl_lazy_state *state = state_of(tracer, at->frame, query->error);
     if (!state) return false;
     const pl_lazy_item *it = &state->items[at->item];
-    const pl_item *item = &it->item;
     bool ok = true;
-    frame f = *parent;
-    f.state = NULL;
+    frame f = w->frames[at->frame];
     f.item = at->item;
-    for (uint32_t i = 0; i < item->transform_count; i++) pl_map_ray(item->transforms[i], f.o, f.d);
-    if (!extend_path(w, item, query->error)) return false;
+    for (uint32_t i = 0; i < it->transform_count; i++) pl_map_ray(it->transforms[i], f.o, f.d);
+    if (!extend_path(w, it, query->error)) return false;
     f.terms = w->path.length;
-    if (item->kind == PL_NODE_ENTER) {
-        if (it->gate && pass_gate(tracer, it, &f, query, &ok) != PL_GATE_OPEN) return ok;
+    if (it->enter) {
+        if (!pass_gate(tracer, it, &f, query, &ok) || !ok) return ok;
         if (it->unbounded && ++w->unknown > MOST_UNKNOWN)
-            return fail_work(scene, item->what, "entered more instances of unknown size than", MOST_UNKNOWN, query->error);
-        return enter(tracer, item->what, it->scope, &f, query);
+            return fail_work(scene, it->what, "entered more instances of unknown size than", MOST_UNKNOWN, query->error);
+        return enter(tracer, it, &f, query);
     }
-    pl_leaf leaf = {.arguments = item->arguments, .primitive = UINT64_MAX, .path = write_path, .source = w};
-    if (item->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[item->what];
-    else leaf.shape = item->what;
+    pl_leaf leaf = {.arguments = it->arguments, .primitive = UINT64_MAX, .path = write_path, .source = w};
+    if (it->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[it->what];
+    else leaf.shape = it->what;
     tracer->counters.primitive_tests++;
     leaf.o = f.o;
     leaf.d = f.d;
@@ -250,21 +326,26 @@ static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
 
 static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
 {
+    static const pl_footprint none;
     work *w = tracer->work;
-    frame root = {.stretch = 1.0, .inside = {query->t_min, INFINITY}};
+    pl_lazy_cache *cache = tracer->scene->structure;
+    frame root = {.stretch = 1.0, .spanned = true, .inside = {query->t_min, INFINITY}};
     memcpy(root.o, ray->origin, sizeof root.o);
     memcpy(root.d, ray->direction, sizeof root.d);
-    w->stack_count = w->path.length = w->unknown = 0;
-    w->spent = 0;
-    bool ok = enter(tracer, UINT32_MAX, NULL, &root, query);
+    w->stack_count = w->frame_count = w->path.length = w->unknown = 0;
+    w->spent = w->found = 0;
+    w->footprint = tracer->scene->gates ? query->footprint : none;
+    w->half = pl_lazy_hold(cache);
+    bool ok = enter(tracer, NULL, &root, query);
     for (uint64_t steps = 0; ok && w->stack_count && !query->done; steps++) {
         pending at = w->stack[--w->stack_count];
         if (steps > PL_LIMIT_RAY_STEPS) ok = pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
         else if (at.t_entry > query->t_max) continue;
-        leave_frames(w, at.frame + 1);
+        w->frame_count = at.frame + 1;
         ok = ok && visit(tracer, &at, query);
     }
-    leave_frames(w, 0);
+    pl_lazy_release(cache, w->half);
+    pl_lazy_add_found(cache, w->found);
     return ok;
 }
 

@@ -2,14 +2,19 @@
  *
  * Where every plant is its own (a live random key) or updates don't commute, there are too many states to build. Then a
  * state is unfolded one application at a time, when a ray comes to it: its items, each with a box from the
- * classes (class.h), which are conservative without anything below being unfolded. What isn't in use is thrown out by the
- * clock when the budget is used up, and unfolded again when it is needed: a state is a pure function of its key.
+ * classes (class.h), which are conservative without anything below being unfolded. An item points at the state that it
+ * enters as soon as that is unfolded, so a ray goes down a tree without looking anything up.
  *
- *     pl_lazy_state *state = pl_lazy_get(cache, unfolder, symbol, scope, &work, error);     pinned
- *     …
- *     pl_lazy_release(state);
+ * The cache has two halves. States are put into one of them; when it is full the other one is emptied and taken instead. So
+ * nothing points at what is gone, as long as no ray stands in both: a ray holds one half at a time, and when that changes
+ * it lets go of all states and finds them again by their scopes. A state is a pure function of its key.
  *
- * Shared by all threads: shards by key, each with a lock; an unfolding holds none. */
+ *     pl_lazy_half *half = pl_lazy_hold(cache);                                 a ray begins
+ *     pl_lazy_state *state = pl_lazy_get(cache, half, unfolder, symbol, scope, …);
+ *     half = pl_lazy_change(cache, half);                                       where there was no room
+ *     pl_lazy_release(cache, half);                                             it ends
+ *
+ * Shared by all threads; an unfolding holds no lock. */
 #ifndef PL_LAZY_H
 #define PL_LAZY_H
 
@@ -18,48 +23,49 @@
 #include "../class.h"
 #include "accel.h"
 
-/* A box that shrinks while others read it, as more is learnt of what it holds: each plane holds by itself, so whatever mixture
- * of old and new planes is read does. */
-typedef struct pl_shrinking_box {
-    _Atomic double lo[3], hi[3];
-} pl_shrinking_box;
+typedef struct pl_lazy_state pl_lazy_state;
+
+/* What an item has that enters a state. `content` holds the primitives below, in the frame of the item's state. It shrinks while
+ * others read it, as more is learnt of what stands there: each plane holds by itself, so whatever mixture of old and new
+ * planes is read does. */
+typedef struct pl_lazy_enter {
+    pl_gate_box gate; /* of the state, in its frame */
+    const uint64_t *scope; /* packed, as it is there */
+    const double *stretches; /* with cut-offs: of the item's transformations; else NULL */
+    _Atomic(pl_lazy_state *) state; /* NULL: not unfolded yet */
+    _Atomic float content[6]; /* lo, hi */
+    float to_parent[12]; /* nearly the product of the item's transformations */
+    bool shrinks; /* all that is drawn stands near the content */
+} pl_lazy_enter;
 
 typedef struct pl_lazy_item {
-    pl_item item; /* of an enter item, `what` is the symbol's node */
-    pl_shrinking_box *box; /* in the state's frame */
-    pl_reach reach;
-    bool unbounded;
-    const uint64_t *scope; /* of an enter item: packed, as it is there */
-    const pl_gate_box *gate; /* of an enter item, with cut-offs; else NULL */
+    float box[6]; /* lo, hi: of all that may be met or drawn, in the state's frame */
+    uint8_t kind; /* as pl_item */
+    bool no_shadow, unbounded;
+    uint32_t what; /* of an enter item: the symbol's node */
+    uint32_t transform_count, term_count;
+    const pl_transform *const *transforms;
+    const uint32_t *terms;
+    const double *arguments; /* of a primitive */
+    pl_lazy_enter *enter; /* of an enter item; else NULL */
 } pl_lazy_item;
 
-typedef struct pl_lazy_state {
-    struct pl_lazy_state *next; /* in its bucket */
+struct pl_lazy_state {
+    pl_lazy_state *next; /* in its bucket */
     uint64_t hash;
     uint32_t symbol, key_words, item_count;
-    atomic_uint pins;
-    atomic_bool touched;
-    size_t bytes;
+    bool unbounded; /* one of its items is */
     pl_reach reach; /* of all its items */
     const uint64_t *key;
     const pl_lazy_item *items;
-} pl_lazy_state;
+};
 
-static inline pl_box pl_lazy_box(const pl_lazy_item *item)
-{
-    pl_box box;
-    for (int axis = 0; axis < 3; axis++) {
-        box.lo[axis] = atomic_load_explicit(&item->box->lo[axis], memory_order_relaxed);
-        box.hi[axis] = atomic_load_explicit(&item->box->hi[axis], memory_order_relaxed);
-    }
-    return box;
-}
-
-/* A state was unfolded by way of an item: its items' boxes bound the item's. Returns whether that made it much smaller. */
-bool pl_lazy_shrink(const pl_lazy_item *item, const pl_lazy_state *state);
+/* The state was unfolded that an item enters: its items' contents bound the item's. Returns whether that made it much smaller. */
+bool pl_lazy_shrink(pl_lazy_enter *enter, const pl_lazy_state *state);
 
 typedef struct pl_lazy_cache pl_lazy_cache;
-typedef struct pl_unfolder pl_unfolder; /* a thread's working memory */
+typedef struct pl_lazy_half pl_lazy_half;
+typedef struct pl_unfolder pl_unfolder; /* a thread's working memory (lazy_unfold.c) */
 
 /* What a scene's budget leaves for states and classes. */
 size_t pl_lazy_budget(const pl_scene *scene);
@@ -67,14 +73,16 @@ size_t pl_lazy_budget(const pl_scene *scene);
 pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_error *error);
 void pl_lazy_cache_free(pl_lazy_cache *cache);
 
-pl_unfolder *pl_unfolder_create(const pl_scene *scene, pl_error *error);
-void pl_unfolder_free(pl_unfolder *unfolder);
+/* The half that is being filled, whose states stay until it is released. It may be changed for another one when it is
+ * full, which waits for rays that still stand in that; then all states are gone that the ray has come to. */
+pl_lazy_half *pl_lazy_hold(pl_lazy_cache *cache);
+pl_lazy_half *pl_lazy_change(pl_lazy_cache *cache, pl_lazy_half *half);
+void pl_lazy_release(pl_lazy_cache *cache, pl_lazy_half *half);
 
-/* The state that a packed scope leads to at a symbol (UINT32_MAX, NULL: the scene itself), pinned. NULL: an error. *work grows
- * by the nodes that were visited to unfold it and to bound what it consists of; is_new: it was unfolded. */
-pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_unfolder *unfolder, uint32_t symbol, const uint64_t *scope,
-                           uint64_t *work, bool *is_new, pl_error *error);
-void pl_lazy_release(pl_lazy_state *state);
+/* The state that a packed scope leads to at a symbol (UINT32_MAX, NULL: the scene itself). NULL: an error or, with `full` set, no room in
+ * the half. *work grows by the nodes that were visited to unfold it and to bound what it consists of. */
+pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder *unfolder, uint32_t symbol,
+                           const uint64_t *scope, uint64_t *work, bool *full, pl_error *error);
 
 /* The coverage (cut.h) of the state that a packed scope leads to at a symbol, from a direction of its frame. */
 double pl_lazy_coverage(pl_unfolder *unfolder, uint32_t symbol, const uint64_t *scope, const double d[3]);
@@ -84,6 +92,24 @@ typedef struct pl_lazy_counts {
 } pl_lazy_counts;
 void pl_lazy_count(pl_lazy_cache *cache, pl_lazy_counts *counts);
 
+/* Adds to the times that a ray came to a state that was there. */
+void pl_lazy_add_found(pl_lazy_cache *cache, uint64_t found);
+
 pl_classes *pl_lazy_classes(pl_lazy_cache *cache);
+
+/* --- lazy_unfold.c --- */
+
+pl_unfolder *pl_unfolder_create(const pl_scene *scene, pl_error *error);
+void pl_unfolder_free(pl_unfolder *unfolder);
+
+/* The key of the state that a packed scope leads to; NULL: no memory. */
+const uint64_t *pl_unfolder_key(pl_unfolder *unfolder, uint32_t symbol, const uint64_t *scope, uint32_t *words);
+
+/* Derives the state whose key was asked for last, and what it takes in bytes. */
+bool pl_unfolder_derive(pl_unfolder *unfolder, uint32_t symbol, pl_classes *classes, size_t *bytes, uint64_t *work,
+                        pl_error *error);
+
+/* Writes it to memory of so many bytes. */
+pl_lazy_state *pl_unfolder_write(pl_unfolder *unfolder, uint32_t symbol, uint64_t hash, void *memory);
 
 #endif
