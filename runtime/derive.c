@@ -194,10 +194,16 @@ static bool enter_symbol(pl_walk *walk, uint32_t node, pl_error *error)
 static bool compute_transform(pl_walk *walk, uint32_t node, pl_error *error)
 {
     const pl_node *it = &walk->program->nodes[node];
+    const pl_transform *kept = walk->memo ? pl_memo_find(walk->memo, node, walk->scope.parameters) : NULL;
+    walk->transform = &walk->computed;
+    if (kept) {
+        walk->computed = *kept;
+        return true;
+    }
     if (!pl_run(walk->program, node, it->as.transform_code.code, &walk->scope, &walk->result, error)) return false;
     pl_transform_set(&walk->computed, &walk->result.matrix);
     if (walk->stretches) walk->computed.stretch = pl_largest_stretch(&walk->computed.to_parent);
-    walk->transform = &walk->computed;
+    if (walk->memo) pl_memo_keep(walk->memo, &walk->computed);
     return true;
 }
 

@@ -18,6 +18,7 @@
 #ifndef PL_DERIVE_H
 #define PL_DERIVE_H
 
+#include "derive_memo.h"
 #include "expression.h"
 #include "shapes/shape.h"
 #include "trace.h"
@@ -61,6 +62,7 @@ typedef struct pl_walk {
     bool announce;         /* report PL_EVENT_NODE */
     bool stretches;        /* find the stretch of computed transformations too */
     const pl_path *follow; /* take only these terms at unions */
+    pl_memo *memo;         /* of computed transformations; NULL: none */
 
     /* The event. */
     uint32_t node;

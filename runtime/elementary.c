@@ -212,7 +212,7 @@ static pair cosine(pair x)
  * difference). */
 static double reduce(double degrees, int *quadrant)
 {
-    const double turn = fmod(degrees, 360);
+    const double turn = fabs(degrees) < 360 ? degrees : fmod(degrees, 360);
     const double q = pl_round(turn / 90);
     *quadrant = (int)q & 3;
     return turn - 90 * q;
@@ -250,6 +250,21 @@ double pl_cos(double degrees)
     const pair x = scale_by(RADIANS, rest);
     const pair result = quadrant % 2 ? sine(x) : cosine(x);
     return quadrant == 1 || quadrant == 2 ? -result.high - result.low : result.high + result.low;
+}
+
+void pl_sin_cos(double degrees, double *sin_, double *cos_)
+{
+    int quadrant;
+    const double rest = degrees - degrees == 0 ? reduce(degrees, &quadrant) : 0;
+    if (fabs(rest) < TINY) {
+        *sin_ = pl_sin(degrees);
+        *cos_ = pl_cos(degrees);
+        return;
+    }
+    const pair x = scale_by(RADIANS, rest), s = sine(x), c = cosine(x);
+    const double a = s.high + s.low, b = c.high + c.low;
+    *sin_ = quadrant == 0 ? a : quadrant == 1 ? b : quadrant == 2 ? -a : -b;
+    *cos_ = quadrant == 0 ? b : quadrant == 1 ? -a : quadrant == 2 ? -b : a;
 }
 
 double pl_tan(double degrees)

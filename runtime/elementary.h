@@ -19,6 +19,7 @@
  */
 double pl_sin(double degrees);
 double pl_cos(double degrees);
+void pl_sin_cos(double degrees, double *sin_, double *cos_); /* both, with the same bits */
 double pl_tan(double degrees); /* at odd multiples of 90: an infinity of the sign of the sine */
 double pl_asin(double a);      /* NaN outside [-1, 1] */
 double pl_acos(double a);

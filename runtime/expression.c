@@ -193,7 +193,8 @@ static bool fail_weights(const machine *m, double total)
 /* M := M * R for a rotation in the plane of axes i and j, from i towards j. */
 static void rotate_plane(pl_affine *matrix, int i, int j, double degrees)
 {
-    const double c = pl_cos(degrees), s = pl_sin(degrees);
+    double c, s;
+    pl_sin_cos(degrees, &s, &c);
     for (int r = 0; r < 3; r++) {
         double *row = matrix->m + 4 * r;
         const double a = row[i], b = row[j];
@@ -214,7 +215,9 @@ static bool rotation(const double a[4], pl_affine *out)
     x /= length;
     y /= length;
     z /= length;
-    const double c = pl_cos(a[0]), s = pl_sin(a[0]), t = 1 - c;
+    double c, s;
+    pl_sin_cos(a[0], &s, &c);
+    const double t = 1 - c;
     *out = (pl_affine){{t * x * x + c, t * x * y - s * z, t * x * z + s * y, 0,
                         t * x * y + s * z, t * y * y + c, t * y * z - s * x, 0,
                         t * x * z - s * y, t * y * z + s * x, t * z * z + c, 0}};

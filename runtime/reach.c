@@ -43,8 +43,12 @@ double pl_largest_stretch(const pl_affine *map)
 
 pl_reach pl_reach_through(const pl_transform *transform, const pl_reach *below)
 {
+    return pl_reach_with(transform, pl_largest_stretch(&transform->to_parent), pl_largest_stretch(&transform->to_object), below);
+}
+
+pl_reach pl_reach_with(const pl_transform *transform, double m, double n, const pl_reach *below)
+{
     const double c = PL_REACH_ROUNDINGS, *move = transform->to_parent.m;
-    double m = pl_largest_stretch(&transform->to_parent), n = pl_largest_stretch(&transform->to_object);
     double tau = sqrt(move[3] * move[3] + move[7] * move[7] + move[11] * move[11]);
     double size = m * below->size + tau;
 

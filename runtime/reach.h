@@ -48,8 +48,9 @@ static inline double pl_reach_slack(const pl_reach *reach, const double o[3])
     return DBL_EPSILON * (reach->gain * distance + reach->base);
 }
 
-/* From below a transformation to above it. */
+/* From below a transformation to above it; stretches: bounds of those of to_parent and to_object. */
 pl_reach pl_reach_through(const pl_transform *transform, const pl_reach *below);
+pl_reach pl_reach_with(const pl_transform *transform, double stretch, double inverse_stretch, const pl_reach *below);
 
 /* The largest singular value of the linear part, rounded up. */
 double pl_largest_stretch(const pl_affine *map);

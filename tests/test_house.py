@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # it is a contract only: rays and hits, which the derivation knows too.
 LAYERS = [
     ["include/plsys.h", "bytecode.h", "affine.h", "array.h", "random.h", "elementary.h", "error.h", "box.h", "table.h", "vector.h"],
-    ["program.h", "reader.h", "expression.h", "trace.h"],
+    ["program.h", "reader.h", "expression.h", "derive_memo.h", "trace.h"],
     ["shapes/*.h"],
     ["derive.h", "state.h", "reach.h", "coverage.h", "cut.h", "interval.h", "hull.h", "class.h"],
     ["scene.h"],

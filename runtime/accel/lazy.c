@@ -119,6 +119,13 @@ static inline pl_span clip_content(const work *w, const frame *f, const pl_slab 
     return clip(slab, planes, span.enter, span.leave);
 }
 
+/* Asks for a state's memory before the ray comes to it: what stands near the bottom of a tree is in no cache. */
+static inline void fetch(const pl_lazy_state *state)
+{
+    if (!state) return;
+    for (int line = 0; line < 5; line++) __builtin_prefetch((const char *)state + 64 * line);
+}
+
 /* Pushes the items that the ray meets, the nearest last. */
 static bool push_items(work *w, uint32_t index, pl_query *query, pl_counters *counters)
 {
@@ -144,6 +151,7 @@ static bool push_items(work *w, uint32_t index, pl_query *query, pl_counters *co
         size_t place = w->stack_count++;
         for (; place > first && w->stack[place - 1].t_entry < span.enter; place--) w->stack[place] = w->stack[place - 1];
         w->stack[place] = (pending){span.enter, index, i};
+        if (it->enter) fetch(atomic_load_explicit(&it->enter->state, memory_order_relaxed));
     }
     return true;
 }

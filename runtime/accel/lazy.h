@@ -34,7 +34,7 @@ typedef struct pl_lazy_enter {
     const double *stretches; /* with cut-offs: of the item's transformations; else NULL */
     _Atomic(pl_lazy_state *) state; /* NULL: not unfolded yet */
     _Atomic float content[6]; /* lo, hi */
-    float to_parent[12]; /* nearly the product of the item's transformations */
+    float to_parent[12], slack; /* nearly the product of the item's transformations */
     bool shrinks; /* all that is drawn stands near the content */
 } pl_lazy_enter;
 

@@ -17,7 +17,7 @@ typedef struct chunk {
 
 struct pl_lazy_half {
     pl_lazy_state **buckets;
-    chunk *chunks;
+    chunk *chunks, *spare; /* the newest first; emptied ones */
     size_t bytes;
     uint64_t states;
     unsigned users; /* rays that stand in it */
@@ -30,7 +30,7 @@ struct pl_lazy_cache {
     pthread_cond_t released;
     pl_lazy_half halves[2], *current;
     uint32_t bucket_count;
-    size_t limit; /* of a half */
+    size_t limit, chunk_size; /* of a half */
     uint64_t unfolded, evicted;
     atomic_uint_fast64_t found;
 };
@@ -62,6 +62,10 @@ pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_erro
     cache->bucket_count = 16;
     while (cache->bucket_count < (1u << 20) && (size_t)cache->bucket_count * BYTES_A_BUCKET < limit) cache->bucket_count *= 2;
     cache->limit = (limit - limit / 4) / 2;
+    cache->chunk_size = cache->limit / 16;
+    cache->chunk_size = cache->chunk_size < SMALLEST_CHUNK   ? SMALLEST_CHUNK
+                        : cache->chunk_size > LARGEST_CHUNK ? LARGEST_CHUNK
+                                                             : cache->chunk_size / 16 * 16;
     for (int i = 0; i < 2; i++) {
         cache->halves[i].buckets = calloc(cache->bucket_count, sizeof(pl_lazy_state *));
         cache->halves[i].bytes = cache->bucket_count * sizeof(pl_lazy_state *);
@@ -73,23 +77,21 @@ pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_erro
     return NULL;
 }
 
-static void empty(pl_lazy_cache *cache, pl_lazy_half *half)
+static void free_chunks(chunk *chunks)
 {
-    while (half->chunks) {
-        chunk *next = half->chunks->next;
-        free(half->chunks);
-        half->chunks = next;
+    while (chunks) {
+        chunk *next = chunks->next;
+        free(chunks);
+        chunks = next;
     }
-    if (half->buckets) memset(half->buckets, 0, cache->bucket_count * sizeof *half->buckets);
-    half->bytes = cache->bucket_count * sizeof *half->buckets;
-    half->states = 0;
 }
 
 void pl_lazy_cache_free(pl_lazy_cache *cache)
 {
     if (!cache) return;
     for (int i = 0; i < 2; i++) {
-        empty(cache, &cache->halves[i]);
+        free_chunks(cache->halves[i].chunks);
+        free_chunks(cache->halves[i].spare);
         free(cache->halves[i].buckets);
     }
     pthread_mutex_destroy(&cache->lock);
@@ -126,6 +128,24 @@ void pl_lazy_release(pl_lazy_cache *cache, pl_lazy_half *half)
     pthread_mutex_unlock(&cache->lock);
 }
 
+/* Memory is kept for what comes next; chunks for a single large state aren't. */
+static void empty(pl_lazy_cache *cache, pl_lazy_half *half)
+{
+    while (half->chunks) {
+        chunk *c = half->chunks;
+        half->chunks = c->next;
+        if (c->size == cache->chunk_size) {
+            *c = (chunk){.next = half->spare, .size = c->size};
+            half->spare = c;
+        } else {
+            half->bytes -= sizeof *c + c->size;
+            free(c);
+        }
+    }
+    memset(half->buckets, 0, cache->bucket_count * sizeof *half->buckets);
+    half->states = 0;
+}
+
 /* A ray that waits stands in neither half, and one that doesn't ends or comes here, so no two wait for each other. */
 pl_lazy_half *pl_lazy_change(pl_lazy_cache *cache, pl_lazy_half *half)
 {
@@ -149,10 +169,14 @@ static void *allocate(pl_lazy_cache *cache, pl_lazy_half *half, size_t bytes, bo
 {
     bytes = (bytes + 15) & ~(size_t)15;
     chunk *c = half->chunks;
-    if (!c || c->used + bytes > c->size) {
-        size_t size = cache->limit / 16;
-        size = size < SMALLEST_CHUNK ? SMALLEST_CHUNK : size > LARGEST_CHUNK ? LARGEST_CHUNK : size;
-        if (size < bytes) size = bytes;
+    const bool fits = c && c->used + bytes <= c->size;
+    if (!fits && half->spare && bytes <= cache->chunk_size) {
+        c = half->spare;
+        half->spare = c->next;
+        c->next = half->chunks;
+        half->chunks = c;
+    } else if (!fits) {
+        const size_t size = bytes > cache->chunk_size ? bytes : cache->chunk_size;
         *full = half->states && half->bytes + sizeof *c + size > cache->limit;
         if (*full || !(c = malloc(sizeof *c + size))) return NULL;
         *c = (chunk){.next = half->chunks, .size = size};
@@ -252,7 +276,7 @@ bool pl_lazy_shrink(pl_lazy_enter *enter, const pl_lazy_state *state)
     join_items(state, below);
     for (int axis = 0; axis < 3 && below[0] <= below[3]; axis++) {
         const float *row = enter->to_parent + 4 * axis;
-        float middle = row[3], half = fabsf(row[3]) * ROUNDINGS;
+        float middle = row[3], half = fabsf(row[3]) * ROUNDINGS + enter->slack;
         for (int k = 0; k < 3; k++) {
             middle += row[k] * 0.5f * (below[k] + below[3 + k]);
             half += fabsf(row[k]) * (0.5f * (below[3 + k] - below[k]) + ROUNDINGS * (fabsf(below[k]) + fabsf(below[3 + k])));

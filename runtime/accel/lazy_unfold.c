@@ -10,14 +10,25 @@
 /* Of an event of the derivation, in nodes visited by a walk over a class. */
 enum { EVENT_WORK = 4 };
 
+enum { KNOWN_BOUNDS = 64, MOST_LIVE = 8 };
+
 /* What tracing needs of a computed transformation: all before to_parent (program.h). */
 #define MAP_BYTES offsetof(pl_transform, to_parent)
+
+/* Bounds of the classes that were asked for last; a place for each hash. */
+typedef struct known_bounds {
+    uint32_t symbol, count; /* of live parameters, + 1; 0: none */
+    uint64_t live[MOST_LIVE];
+    pl_bounds bounds;
+    pl_gate_box gate;
+} known_bounds;
 
 /* Growing arrays of what is being unfolded; a draft refers to them by index. */
 typedef struct draft {
     pl_lazy_item it;
     pl_box box, content;
-    pl_affine map; /* of an enter item: to_parent */
+    pl_affine map; /* the product of its transformations' to_parent … */
+    double slack;  /* … and how far roundings of that may move a point */
     bool shrinks;
     pl_reach reach;
     pl_gate_box gate;
@@ -31,6 +42,7 @@ struct pl_unfolder {
     pl_scope scope;
     pl_array drafts, chain, transforms, computed, terms, scopes, key;
     uint64_t work;
+    known_bounds known[KNOWN_BOUNDS];
     size_t entered, primitives; /* drafts of states, of shapes */
     size_t entered_transforms;
 };
@@ -55,7 +67,8 @@ pl_unfolder *pl_unfolder_create(const pl_scene *scene, pl_error *error)
     }
     if (u && u->scope.parameters && pl_walk_begin(&u->walk, scene->program, 0, NULL, error)) {
         u->walk.stretches = scene->gates != NULL;
-        return u;
+        u->walk.memo = pl_memo_create(scene->program);
+        if (u->walk.memo) return u;
     }
     pl_unfolder_free(u);
     pl_fail_memory(error, "preparing to unfold");
@@ -65,6 +78,7 @@ pl_unfolder *pl_unfolder_create(const pl_scene *scene, pl_error *error)
 void pl_unfolder_free(pl_unfolder *u)
 {
     if (!u) return;
+    pl_memo_free(u->walk.memo);
     pl_walk_end(&u->walk);
     free(u->scope.parameters);
     pl_array *arrays[] = {&u->drafts, &u->chain, &u->transforms, &u->computed, &u->terms, &u->scopes, &u->key};
@@ -94,37 +108,98 @@ static const pl_transform *link_transform(const pl_unfolder *u, const link_ *l)
     return l->constant ? l->constant : (const pl_transform *)u->computed.data + l->computed;
 }
 
-static pl_affine map_of(const pl_unfolder *u, const link_ *links, uint32_t count)
+/* What is known of the state that the walk enters. */
+static const known_bounds *bounds_of(pl_unfolder *u, pl_classes *classes, uint32_t symbol)
 {
-    pl_affine map = pl_affine_identity();
-    for (uint32_t i = 0; i < count; i++) map = pl_affine_multiply(&map, &link_transform(u, &links[i])->to_parent);
-    return map;
+    const pl_program *program = u->scene->program;
+    const pl_node *node = &program->nodes[symbol];
+    const uint32_t count = node->as.symbol.live_count;
+    uint64_t live[MOST_LIVE], hash = symbol;
+    for (uint32_t i = 0; i < count && i < MOST_LIVE; i++) {
+        memcpy(&live[i], &u->walk.scope.parameters[program->slots[node->as.symbol.live_first + i]], sizeof live[i]);
+        hash = (hash ^ live[i]) * UINT64_C(0x9E3779B97F4A7C15);
+    }
+    known_bounds *known = &u->known[(hash >> 32) % KNOWN_BOUNDS];
+    if (count <= MOST_LIVE && known->count == count + 1 && known->symbol == symbol &&
+        (!count || memcmp(known->live, live, count * sizeof *live) == 0))
+        return known;
+    pl_classes_bound(classes, symbol, &u->walk.scope, &known->bounds, &u->work);
+    known->gate = pl_bounds_gate(&known->bounds);
+    known->symbol = symbol;
+    known->count = count <= MOST_LIVE ? count + 1 : 0;
+    if (known->count) memcpy(known->live, live, count * sizeof *live);
+    return known;
+}
+
+/* A bound of the largest stretch that is found at once, not much larger: items' reaches only filter. */
+static double rough_stretch(const pl_affine *map)
+{
+    double square = 0.0;
+    for (int i = 0; i < 12; i++) square += i % 4 == 3 ? 0.0 : map->m[i] * map->m[i];
+    return sqrt(square) * (1.0 + 16.0 * DBL_EPSILON);
+}
+
+static pl_box widened(const pl_box *box, double slack)
+{
+    pl_box wide = *box;
+    for (int axis = 0; axis < 3; axis++) {
+        wide.lo[axis] -= slack;
+        wide.hi[axis] += slack;
+    }
+    return wide;
+}
+
+/* The reach and box of a draft, which are those of its leaf or state, in the state's frame; and its map. */
+static void bring_up(const pl_unfolder *u, draft *d)
+{
+    const link_ *links = u->chain.data;
+    const pl_shape *shape = d->it.kind == PL_NODE_PRIMITIVE ? pl_shape_of(d->it.what) : NULL;
+    d->map = pl_affine_identity();
+    d->slack = 0.0;
+    for (size_t i = d->it.transform_count; i-- > 0;) {
+        const pl_transform *transform = link_transform(u, &links[i]);
+        const double m = rough_stretch(&transform->to_parent), n = rough_stretch(&transform->to_object);
+        d->reach = pl_reach_with(transform, m, n, &d->reach);
+        d->slack = m * d->slack + 128.0 * DBL_EPSILON * d->reach.size;
+        d->map = pl_affine_multiply(&transform->to_parent, &d->map);
+    }
+    if (d->it.unbounded || pl_box_is_empty(&d->box)) return;
+    const pl_box box = shape ? pl_shape_box(shape, d->arguments, d->map.m) : pl_box_map(&d->map, &d->box);
+    d->box = widened(&box, d->slack);
+    d->it.unbounded = !pl_box_is_finite(&d->box);
 }
 
 /* The bounds of a draft in the state's frame. With a cut-off an instance may be drawn as its whole box, however little stands
  * in it. */
 static void bound(pl_unfolder *u, pl_classes *classes, draft *d)
 {
-    pl_bounds bounds;
     pl_lazy_item *it = &d->it;
-    const bool enters = it->kind == PL_NODE_ENTER, whole = u->scene->gates && enters;
-    if (enters) {
-        pl_classes_bound(classes, it->what, &u->walk.scope, &bounds, &u->work);
-        d->gate = pl_bounds_gate(&bounds);
-        if (whole) bounds.reach = d->gate.reach;
-        d->shrinks = !bounds.unbounded && !pl_box_is_empty(&bounds.box) && !(whole && bounds.hollow);
-    } else if (it->kind == PL_NODE_MESH) {
-        pl_bounds_of_box(pl_mesh_box(u->scene->meshes[it->what]), &bounds);
-    } else {
-        pl_bounds_of_shape(pl_shape_of(it->what), d->arguments, d->arguments, &bounds);
+    pl_bounds leaf;
+    if (it->kind == PL_NODE_ENTER) {
+        const known_bounds *known = bounds_of(u, classes, it->what);
+        const bool whole = u->scene->gates != NULL, empty = pl_box_is_empty(&known->bounds.box);
+        d->gate = known->gate;
+        d->box = known->bounds.box;
+        d->reach = whole ? d->gate.reach : known->bounds.reach;
+        it->unbounded = known->bounds.unbounded;
+        bring_up(u, d);
+        d->shrinks = !it->unbounded && !empty && !(whole && known->bounds.hollow);
+        if (!d->shrinks) return;
+        const pl_box content = pl_hull_box_under(&d->map, &known->bounds.hull);
+        d->content = widened(&content, d->slack);
+        return;
     }
-    const link_ *links = u->chain.data;
-    if (enters) d->map = map_of(u, links, it->transform_count);
-    if (d->shrinks) d->content = pl_hull_box_under(&d->map, &bounds.hull);
-    for (size_t i = it->transform_count; i-- > 0;) pl_bounds_through(link_transform(u, &links[i]), true, &bounds);
-    d->box = bounds.box;
-    d->reach = bounds.reach;
-    it->unbounded = bounds.unbounded;
+    if (it->kind == PL_NODE_MESH) {
+        pl_bounds_of_box(pl_mesh_box(u->scene->meshes[it->what]), &leaf);
+    } else {
+        const pl_shape *shape = pl_shape_of(it->what);
+        const pl_box box = shape->support ? pl_shape_box(shape, d->arguments, NULL) : pl_box_everything();
+        pl_bounds_of_box(&box, &leaf);
+    }
+    d->box = leaf.box;
+    d->reach = leaf.reach;
+    it->unbounded = leaf.unbounded;
+    bring_up(u, d);
 }
 
 static bool add_draft(pl_unfolder *u, pl_classes *classes, uint8_t kind, uint32_t what)
@@ -232,6 +307,7 @@ static void write_enter(const draft *d, pl_lazy_enter *enter)
     atomic_init(&enter->state, NULL);
     for (int i = 0; i < 6; i++) atomic_init(&enter->content[i], content[i]);
     for (int i = 0; i < 12; i++) enter->to_parent[i] = (float)d->map.m[i];
+    enter->slack = pl_round_up(d->slack);
 }
 
 pl_lazy_state *pl_unfolder_write(pl_unfolder *u, uint32_t symbol, uint64_t hash, void *memory)
