@@ -21,7 +21,8 @@ void pl_bounds_of_box(const pl_box *box, pl_bounds *bounds)
 {
     bounds->box = *box;
     bounds->hull = pl_hull_of_box(box);
-    bounds->count = bounds->fewest = 1;
+    bounds->count = 1;
+    bounds->fewest = !pl_box_is_empty(box);
     bounds->hollow = false;
     bounds->unbounded = !(pl_box_is_empty(box) || pl_box_is_finite(box));
     bounds->reach = pl_reach_leaf(pl_box_is_finite(box) ? 1.7320508075688774 * pl_box_reach(box) : 0.0);

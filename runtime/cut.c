@@ -7,7 +7,7 @@
 #define ROOM_SLACK 4.0
 #define ROOM_SIZE 0x1p-30
 
-pl_span pl_span_clip(const pl_box *box, const double o[3], const double d[3], double slack, pl_span within)
+static pl_span clip(const pl_box *box, const double o[3], const double d[3], double slack, pl_span within)
 {
     pl_slab slab = pl_slab_of(o, d, slack);
     for (int axis = 0; axis < 3; axis++) {
@@ -24,7 +24,7 @@ pl_span pl_span_clip(const pl_box *box, const double o[3], const double d[3], do
 static pl_span span_with_room(const pl_box *box, double diameter, const double o[3], const double d[3], double slack,
                               pl_span within)
 {
-    return pl_span_clip(box, o, d, ROOM_SLACK * slack + ROOM_SIZE * diameter, within);
+    return clip(box, o, d, ROOM_SLACK * slack + ROOM_SIZE * diameter, within);
 }
 
 pl_span pl_span_in(const pl_states *states, uint32_t state, const double o[3], const double d[3], pl_span within)
@@ -48,7 +48,7 @@ pl_gate pl_gate_at(const pl_gate_box *s, const double o[3], const double d[3], d
         return PL_GATE_OPEN;
     }
     if (pl_box_is_empty(&s->box)) return PL_GATE_MISSED;
-    pl_span own = pl_span_clip(&s->box, o, d, slack, within);
+    pl_span own = clip(&s->box, o, d, slack, within);
     *t_entry = own.enter;
     if (!(own.enter <= own.leave && own.enter <= t_max)) return PL_GATE_MISSED;
     bool small = s->diameter * stretch <= footprint->width + footprint->spread * own.enter;

@@ -58,10 +58,7 @@ pl_gate pl_gate_at(const pl_gate_box *box, const double o[3], const double d[3],
                    const pl_footprint *footprint, pl_span within, double t_min, double t_max, double *t_entry,
                    pl_span *inside);
 
-/* What of a span is within a box, widened by a slack: nothing if `enter` > `leave`. */
-pl_span pl_span_clip(const pl_box *box, const double o[3], const double d[3], double slack, pl_span within);
-
-/* *inside of an open gate. */
+/* *inside of an open gate; nothing (enter > leave) only where the instance is missed. */
 pl_span pl_span_below(const pl_gate_box *gate, const double o[3], const double d[3], pl_span within);
 
 /* The same for a shared state. stretch: the product of the stretches on the path. within: the span above, at first that of the whole scene's box

@@ -25,10 +25,10 @@ typedef struct frame {
     uint32_t symbol, terms; /* terms on the path up to here */
     uint32_t item;          /* of the frame before, by which this one was reached */
     bool spanned;           /* `inside` is known */
-    size_t scope;           /* in `scopes`: what the state is found by again */
     double o[3], d[3];
     double stretch; /* with cut-offs: the product of stretches */
-    pl_span inside; /* of what stands below */
+    double leave;   /* with cut-offs: from there on nothing stands below */
+    pl_span inside; /* with cut-offs: of what stands below */
 } frame;
 
 typedef struct pending {
@@ -91,12 +91,12 @@ static inline bool is_open(const work *w, double size, double to)
     return size > w->footprint.width + w->footprint.spread * to;
 }
 
-/* [t_min, t_max] within a box; nothing if `enter` > `leave`. */
-static inline pl_span clip(const pl_slab *slab, const float planes[6], double t_min, double t_max)
+/* [t_min, t_max] within a box with some room; nothing if `enter` > `leave`. */
+static inline pl_span clip(const pl_slab *slab, const float planes[6], double room, double t_min, double t_max)
 {
     pl_span span = {t_min, t_max};
     for (int axis = 0; axis < 3; axis++) {
-        const double lo = (double)planes[axis], hi = (double)planes[3 + axis];
+        const double lo = (double)planes[axis] - room, hi = (double)planes[3 + axis] + room;
         const double t_near = ((slab->negative[axis] ? hi : lo) - slab->near_origin[axis]) * slab->inverse[axis];
         const double t_far = ((slab->negative[axis] ? lo : hi) - slab->far_origin[axis]) * slab->inverse[axis];
         span.enter = t_near > span.enter ? t_near : span.enter;
@@ -105,18 +105,12 @@ static inline pl_span clip(const pl_slab *slab, const float planes[6], double t_
     return span;
 }
 
-/* The same within an item's content. What is cut below and drawn as its box has content in it and is no larger than a
- * footprint, so it stands no farther out of the content than that. */
-static inline pl_span clip_content(const work *w, const frame *f, const pl_slab *slab, const pl_lazy_item *it, pl_span span)
+/* How far out of a box that holds primitives what is cut may stand that is drawn instead of some of them: it is no larger than a
+ * footprint. */
+static inline double room_of(const work *w, const frame *f)
 {
-    const double footprint = w->footprint.width + w->footprint.spread * span.leave;
-    const float room = pl_round_up(footprint / f->stretch * (1.0 + 0x1p-20));
-    float planes[6];
-    for (int axis = 0; axis < 3; axis++) {
-        planes[axis] = atomic_load_explicit(&it->enter->content[axis], memory_order_relaxed) - room;
-        planes[3 + axis] = atomic_load_explicit(&it->enter->content[3 + axis], memory_order_relaxed) + room;
-    }
-    return clip(slab, planes, span.enter, span.leave);
+    const double footprint = w->footprint.width + (w->footprint.spread > 0.0 ? w->footprint.spread * f->leave : 0.0);
+    return footprint / f->stretch * (1.0 + 0x1p-20);
 }
 
 /* Asks for a state's memory before the ray comes to it: what stands near the bottom of a tree is in no cache. */
@@ -133,6 +127,7 @@ static bool push_items(work *w, uint32_t index, pl_query *query, pl_counters *co
     const pl_lazy_state *state = f->state;
     const size_t first = w->stack_count;
     const pl_slab slab = pl_slab_of(f->o, f->d, pl_reach_slack(&state->reach, f->o));
+    const double room = room_of(w, f);
     for (uint32_t i = 0; i < state->item_count; i++) {
         const pl_lazy_item *it = &state->items[i];
         pl_span span = {query->t_min, query->t_max};
@@ -140,8 +135,7 @@ static bool push_items(work *w, uint32_t index, pl_query *query, pl_counters *co
         if (!it->unbounded) {
             counters->box_tests++;
             if (!(it->box[0] <= it->box[3])) continue;
-            span = clip(&slab, it->box, span.enter, span.leave);
-            if (span.enter <= span.leave && it->enter && it->enter->shrinks) span = clip_content(w, f, &slab, it, span);
+            span = clip(&slab, it->box, it->whole ? 0.0 : room, span.enter, span.leave);
             if (!(span.enter <= span.leave)) {
                 if (index > counters->miss_depth) counters->miss_depth = index;
                 continue;
@@ -151,7 +145,7 @@ static bool push_items(work *w, uint32_t index, pl_query *query, pl_counters *co
         size_t place = w->stack_count++;
         for (; place > first && w->stack[place - 1].t_entry < span.enter; place--) w->stack[place] = w->stack[place - 1];
         w->stack[place] = (pending){span.enter, index, i};
-        if (it->enter) fetch(atomic_load_explicit(&it->enter->state, memory_order_relaxed));
+        fetch(atomic_load_explicit(&it->state, memory_order_relaxed));
     }
     return true;
 }
@@ -162,17 +156,6 @@ static bool fail_work(const pl_scene *scene, uint32_t symbol, const char *what, 
                       "work: one ray %s %llu, which is the limit; does the recursion end?", what, (unsigned long long)limit);
 }
 
-/* A packed scope's words, kept behind those of the last frame: they have no draws, so all are equally long. */
-static bool keep_scope(work *w, const uint64_t *scope, size_t *place, pl_error *error)
-{
-    const size_t words = w->scope_words;
-    *place = w->frame_count * words;
-    if (!scope) return true;
-    if (!grow(&w->scopes, *place + words, &w->scope_capacity, sizeof *w->scopes, error)) return false;
-    memcpy(w->scopes + *place, scope, words * sizeof *scope);
-    return true;
-}
-
 /* The span for what stands below a frame: each within that of the frame before. */
 static pl_span span_of(work *w, size_t index)
 {
@@ -181,52 +164,55 @@ static pl_span span_of(work *w, size_t index)
     for (size_t i = known + 1; i <= index; i++) {
         frame *f = &w->frames[i];
         const pl_lazy_item *it = &w->frames[i - 1].state->items[f->item];
-        f->inside = pl_span_below(&it->enter->gate, f->o, f->d, w->frames[i - 1].inside);
+        f->inside = pl_span_below(it->gate, f->o, f->d, w->frames[i - 1].inside);
         f->spanned = true;
     }
     return w->frames[index].inside;
 }
 
+/* Keeps the scopes of frames that have states, by which they are found again: all are equally long, having no draws. */
+static bool keep_scopes(work *w, pl_error *error)
+{
+    const size_t words = w->scope_words;
+    for (size_t i = 1; i < w->frame_count; i++) {
+        if (!w->frames[i - 1].state) continue;
+        if (!grow(&w->scopes, (i + 1) * words, &w->scope_capacity, sizeof *w->scopes, error)) return false;
+        memcpy(w->scopes + i * words, w->frames[i - 1].state->items[w->frames[i].item].scope, words * sizeof *w->scopes);
+    }
+    return true;
+}
+
 /* Lets all states go for an empty half of the cache. */
-static void change(pl_tracer *tracer)
+static bool change(pl_tracer *tracer, pl_error *error)
 {
     work *w = tracer->work;
-    if (tracer->scene->gates && w->frame_count) span_of(w, w->frame_count - 1);
+    if (tracer->scene->gates) span_of(w, w->frame_count - 1);
+    if (!keep_scopes(w, error)) return false;
     for (size_t i = 0; i < w->frame_count; i++) w->frames[i].state = NULL;
     w->half = pl_lazy_change(tracer->scene->structure, w->half);
     w->changes++;
+    return true;
 }
 
-/* The state of a scope, unfolded; NULL: an error. */
-static pl_lazy_state *get(pl_tracer *tracer, uint32_t symbol, const uint64_t *scope, pl_error *error)
-{
-    work *w = tracer->work;
-    for (;;) {
-        bool full;
-        pl_lazy_state *state = pl_lazy_get(tracer->scene->structure, w->half, w->unfolder, symbol, scope, &w->spent, &full, error);
-        if (!full) return state;
-        change(tracer);
-    }
-}
-
-/* The state of a frame, found again where it was let go. */
+/* The state of a frame: unfolded, or found again where it was let go. */
 static pl_lazy_state *state_of(pl_tracer *tracer, size_t index, pl_error *error)
 {
     work *w = tracer->work;
-    frame *f = &w->frames[index];
-    if (!f->state) f->state = get(tracer, f->symbol, f->symbol == UINT32_MAX ? NULL : w->scopes + f->scope, error);
-    return f->state;
-}
-
-/* What was learnt of the last frame's items is known of those above. */
-static void shrink(work *w)
-{
-    for (size_t i = w->frame_count - 1; i > 0 && w->frames[i].state && w->frames[i - 1].state; i--)
-        if (!pl_lazy_shrink(w->frames[i - 1].state->items[w->frames[i].item].enter, w->frames[i].state)) return;
+    while (!w->frames[index].state) {
+        const frame *above = index ? &w->frames[index - 1] : NULL, *f = &w->frames[index];
+        const uint64_t *scope = !above         ? NULL
+                                : above->state ? above->state->items[f->item].scope
+                                               : w->scopes + index * w->scope_words;
+        bool full;
+        pl_lazy_state *state = pl_lazy_get(tracer->scene->structure, w->half, w->unfolder, f->symbol, scope, &w->spent, &full, error);
+        if (!state && (!full || !change(tracer, error))) return NULL;
+        w->frames[index].state = state;
+    }
+    return w->frames[index].state;
 }
 
 /* Goes into an instance whose ray stands in f: by an item of the last frame, or the scene itself (NULL). */
-static bool enter(pl_tracer *tracer, const pl_lazy_item *it, const frame *as, pl_query *query)
+static bool enter(pl_tracer *tracer, pl_lazy_item *it, const frame *as, pl_query *query)
 {
     work *w = tracer->work;
     frame f = *as;
@@ -234,20 +220,15 @@ static bool enter(pl_tracer *tracer, const pl_lazy_item *it, const frame *as, pl
     if (w->frame_count > PL_LIMIT_DEPTH)
         return pl_fail_at(query->error, PL_ERROR_LIMIT, tracer->scene->program, f.symbol,
                           "depth: a ray came %d symbols deep, which is the limit; does the recursion end?", PL_LIMIT_DEPTH);
-    if (!grow(&w->frames, w->frame_count, &w->frame_capacity, sizeof *w->frames, query->error) ||
-        !keep_scope(w, it ? it->enter->scope : NULL, &f.scope, query->error))
-        return false;
-    f.state = it ? atomic_load_explicit(&it->enter->state, memory_order_acquire) : NULL;
+    if (!grow(&w->frames, w->frame_count, &w->frame_capacity, sizeof *w->frames, query->error)) return false;
+    f.state = it ? atomic_load_explicit(&it->state, memory_order_acquire) : NULL;
     w->found += f.state != NULL;
     w->frames[w->frame_count++] = f;
     if (!f.state) {
         const uint32_t changes = w->changes;
         pl_lazy_state *state = state_of(tracer, w->frame_count - 1, query->error);
         if (!state) return false;
-        if (it && w->changes == changes) {
-            atomic_store_explicit(&it->enter->state, state, memory_order_release);
-            shrink(w);
-        }
+        if (it && w->changes == changes) atomic_store_explicit(&it->state, state, memory_order_release);
     }
     if (w->spent > MOST_WORK)
         return fail_work(tracer->scene, f.symbol, "needed to visit more nodes of the graph than", MOST_WORK, query->error);
@@ -277,14 +258,14 @@ static pl_gate decide(pl_tracer *tracer, const pl_lazy_item *it, frame *f, pl_qu
     const pl_span within = span_of(w, w->frame_count - 1);
     pl_arrival at = {0, f->o, f->d, f->stretch, within, (uint32_t)w->frame_count};
     double t_entry;
-    const pl_gate gate = pl_gate_at(&it->enter->gate, f->o, f->d, f->stretch, &query->footprint, within, query->t_min,
+    const pl_gate gate = pl_gate_at(it->gate, f->o, f->d, f->stretch, &query->footprint, within, query->t_min,
                                     query->t_max, &t_entry, &f->inside);
     f->spanned = gate == PL_GATE_OPEN;
     if (gate != PL_GATE_CUT || !(t_entry < query->t_max)) return gate;
     pl_leaf leaf = {.path = write_path, .source = w};
     const uint64_t hash = pl_cut_hash(0, w->path.terms, w->path.length);
-    const double coverage = pl_lazy_coverage(w->unfolder, it->what, it->enter->scope, f->d);
-    *ok = pl_query_cut_box(query, &it->enter->gate, coverage, &at, hash, t_entry, &leaf);
+    const double coverage = pl_lazy_coverage(w->unfolder, it->what, it->scope, f->d);
+    *ok = pl_query_cut_box(query, it->gate, coverage, &at, hash, t_entry, &leaf);
     return gate;
 }
 
@@ -292,14 +273,16 @@ static pl_gate decide(pl_tracer *tracer, const pl_lazy_item *it, frame *f, pl_qu
 static bool pass_gate(pl_tracer *tracer, const pl_lazy_item *it, frame *f, pl_query *query, bool *ok)
 {
     const work *w = tracer->work;
-    const pl_gate_box *gate = &it->enter->gate;
+    const pl_gate_box *gate = it->gate;
     f->spanned = false;
     if (!tracer->scene->gates) return true;
-    for (uint32_t i = 0; i < it->transform_count; i++) f->stretch *= it->enter->stretches[i];
+    const double *stretches = pl_lazy_stretches(it);
+    for (uint32_t i = 0; i < it->transform_count; i++) f->stretch *= stretches[i];
     if (gate->unbounded) return true;
     const pl_span all = {query->t_min, query->t_max};
-    const pl_span own = pl_span_clip(&gate->box, f->o, f->d, pl_reach_slack(&gate->reach, f->o), all);
+    const pl_span own = pl_span_below(gate, f->o, f->d, all);
     if (!(own.enter <= own.leave)) return false;
+    f->leave = own.leave;
     return is_open(w, gate->diameter * f->stretch, own.leave) || decide(tracer, it, f, query, ok) == PL_GATE_OPEN;
 }
 
@@ -308,16 +291,16 @@ static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
 {
     work *w = tracer->work;
     const pl_scene *scene = tracer->scene;
-    const pl_lazy_state *state = state_of(tracer, at->frame, query->error);
+    pl_lazy_state *state = state_of(tracer, at->frame, query->error);
     if (!state) return false;
-    const pl_lazy_item *it = &state->items[at->item];
+    pl_lazy_item *it = &state->items[at->item];
     bool ok = true;
     frame f = w->frames[at->frame];
     f.item = at->item;
     for (uint32_t i = 0; i < it->transform_count; i++) pl_map_ray(it->transforms[i], f.o, f.d);
     if (!extend_path(w, it, query->error)) return false;
     f.terms = w->path.length;
-    if (it->enter) {
+    if (it->kind == PL_NODE_ENTER) {
         if (!pass_gate(tracer, it, &f, query, &ok) || !ok) return ok;
         if (it->unbounded && ++w->unknown > MOST_UNKNOWN)
             return fail_work(scene, it->what, "entered more instances of unknown size than", MOST_UNKNOWN, query->error);
@@ -337,7 +320,7 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     static const pl_footprint none;
     work *w = tracer->work;
     pl_lazy_cache *cache = tracer->scene->structure;
-    frame root = {.stretch = 1.0, .spanned = true, .inside = {query->t_min, INFINITY}};
+    frame root = {.stretch = 1.0, .leave = query->t_max, .spanned = true, .inside = {query->t_min, INFINITY}};
     memcpy(root.o, ray->origin, sizeof root.o);
     memcpy(root.d, ray->direction, sizeof root.d);
     w->stack_count = w->frame_count = w->path.length = w->unknown = 0;

@@ -25,43 +25,39 @@
 
 typedef struct pl_lazy_state pl_lazy_state;
 
-/* What an item has that enters a state. `content` holds the primitives below, in the frame of the item's state. It shrinks while
- * others read it, as more is learnt of what stands there: each plane holds by itself, so whatever mixture of old and new
- * planes is read does. */
-typedef struct pl_lazy_enter {
-    pl_gate_box gate; /* of the state, in its frame */
-    const uint64_t *scope; /* packed, as it is there */
-    const double *stretches; /* with cut-offs: of the item's transformations; else NULL */
-    _Atomic(pl_lazy_state *) state; /* NULL: not unfolded yet */
-    _Atomic float content[6]; /* lo, hi */
-    float to_parent[12], slack; /* nearly the product of the item's transformations */
-    bool shrinks; /* all that is drawn stands near the content */
-} pl_lazy_enter;
-
+/* A primitive, a mesh or an instance of a state below some transformations. */
 typedef struct pl_lazy_item {
-    float box[6]; /* lo, hi: of all that may be met or drawn, in the state's frame */
+    float box[6]; /* lo, hi: in the state's frame */
     uint8_t kind; /* as pl_item */
     bool no_shadow, unbounded;
+    bool whole; /* the box holds all that may be drawn; else only the primitives, but what is drawn has some of them in it */
     uint32_t what; /* of an enter item: the symbol's node */
     uint32_t transform_count, term_count;
-    const pl_transform *const *transforms;
+    const pl_transform *const *transforms; /* to_object and form; the rest isn't kept */
     const uint32_t *terms;
-    const double *arguments; /* of a primitive */
-    pl_lazy_enter *enter; /* of an enter item; else NULL */
+    union {
+        const double *arguments; /* of a primitive */
+        const pl_gate_box *gate; /* of an enter item: its state's */
+    };
+    /* Of an enter item: */
+    const uint64_t *scope; /* packed, as it is there */
+    _Atomic(pl_lazy_state *) state; /* NULL: not unfolded yet */
 } pl_lazy_item;
 
 struct pl_lazy_state {
     pl_lazy_state *next; /* in its bucket */
     uint64_t hash;
     uint32_t symbol, key_words, item_count;
-    bool unbounded; /* one of its items is */
     pl_reach reach; /* of all its items */
     const uint64_t *key;
-    const pl_lazy_item *items;
+    pl_lazy_item items[];
 };
 
-/* The state was unfolded that an item enters: its items' contents bound the item's. Returns whether that made it much smaller. */
-bool pl_lazy_shrink(pl_lazy_enter *enter, const pl_lazy_state *state);
+/* With cut-offs: the stretch of each of an enter item's transformations. */
+static inline const double *pl_lazy_stretches(const pl_lazy_item *it)
+{
+    return (const double *)(it->transforms + it->transform_count);
+}
 
 typedef struct pl_lazy_cache pl_lazy_cache;
 typedef struct pl_lazy_half pl_lazy_half;

@@ -244,53 +244,6 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder
     return state;
 }
 
-/* Planes that move by less aren't worth telling those above. */
-#define MUCH 0.02
-
-/* What single precision may move a plane by that is found from others. */
-#define ROUNDINGS 0x1p-20f
-
-/* The box of all content of a state. */
-static void join_items(const pl_lazy_state *state, float box[6])
-{
-    for (int axis = 0; axis < 3; axis++) {
-        box[axis] = INFINITY;
-        box[3 + axis] = -INFINITY;
-    }
-    for (uint32_t i = 0; i < state->item_count; i++) {
-        const pl_lazy_item *it = &state->items[i];
-        for (int axis = 0; axis < 3; axis++) {
-            const float lo = it->enter ? atomic_load_explicit(&it->enter->content[axis], memory_order_relaxed) : it->box[axis];
-            const float hi = it->enter ? atomic_load_explicit(&it->enter->content[3 + axis], memory_order_relaxed) : it->box[3 + axis];
-            box[axis] = fminf(box[axis], lo);
-            box[3 + axis] = fmaxf(box[3 + axis], hi);
-        }
-    }
-}
-
-bool pl_lazy_shrink(pl_lazy_enter *enter, const pl_lazy_state *state)
-{
-    float below[6];
-    bool much = false;
-    if (state->unbounded || !enter->shrinks) return false;
-    join_items(state, below);
-    for (int axis = 0; axis < 3 && below[0] <= below[3]; axis++) {
-        const float *row = enter->to_parent + 4 * axis;
-        float middle = row[3], half = fabsf(row[3]) * ROUNDINGS + enter->slack;
-        for (int k = 0; k < 3; k++) {
-            middle += row[k] * 0.5f * (below[k] + below[3 + k]);
-            half += fabsf(row[k]) * (0.5f * (below[3 + k] - below[k]) + ROUNDINGS * (fabsf(below[k]) + fabsf(below[3 + k])));
-        }
-        const float lo = atomic_load_explicit(&enter->content[axis], memory_order_relaxed);
-        const float hi = atomic_load_explicit(&enter->content[3 + axis], memory_order_relaxed);
-        const float least = (float)MUCH * (hi - lo);
-        if (middle - half > lo) atomic_store_explicit(&enter->content[axis], middle - half, memory_order_relaxed);
-        if (middle + half < hi) atomic_store_explicit(&enter->content[3 + axis], middle + half, memory_order_relaxed);
-        much = much || middle - half > lo + least || middle + half < hi - least;
-    }
-    return much;
-}
-
 /* --- counts --- */
 
 void pl_lazy_add_found(pl_lazy_cache *cache, uint64_t found)

@@ -26,10 +26,9 @@ typedef struct known_bounds {
 /* Growing arrays of what is being unfolded; a draft refers to them by index. */
 typedef struct draft {
     pl_lazy_item it;
-    pl_box box, content;
+    pl_box box;
     pl_affine map; /* the product of its transformations' to_parent … */
     double slack;  /* … and how far roundings of that may move a point */
-    bool shrinks;
     pl_reach reach;
     pl_gate_box gate;
     double arguments[PL_SHAPE_ARGUMENTS];
@@ -43,8 +42,8 @@ struct pl_unfolder {
     pl_array drafts, chain, transforms, computed, terms, scopes, key;
     uint64_t work;
     known_bounds known[KNOWN_BOUNDS];
-    size_t entered, primitives; /* drafts of states, of shapes */
-    size_t entered_transforms;
+    size_t primitives, gates, entered_transforms; /* what the drafts will need */
+    size_t last_entered;                          /* the last draft of a state, + 1; 0: none */
 };
 
 /* A transformation of the current path: constant, or one of `computed`. */
@@ -149,11 +148,10 @@ static pl_box widened(const pl_box *box, double slack)
     return wide;
 }
 
-/* The reach and box of a draft, which are those of its leaf or state, in the state's frame; and its map. */
+/* The reach of a draft, which is that of its leaf or state, in the state's frame; and its map. */
 static void bring_up(const pl_unfolder *u, draft *d)
 {
     const link_ *links = u->chain.data;
-    const pl_shape *shape = d->it.kind == PL_NODE_PRIMITIVE ? pl_shape_of(d->it.what) : NULL;
     d->map = pl_affine_identity();
     d->slack = 0.0;
     for (size_t i = d->it.transform_count; i-- > 0;) {
@@ -163,43 +161,54 @@ static void bring_up(const pl_unfolder *u, draft *d)
         d->slack = m * d->slack + 128.0 * DBL_EPSILON * d->reach.size;
         d->map = pl_affine_multiply(&transform->to_parent, &d->map);
     }
-    if (d->it.unbounded || pl_box_is_empty(&d->box)) return;
-    const pl_box box = shape ? pl_shape_box(shape, d->arguments, d->map.m) : pl_box_map(&d->map, &d->box);
-    d->box = widened(&box, d->slack);
-    d->it.unbounded = !pl_box_is_finite(&d->box);
 }
 
-/* The bounds of a draft in the state's frame. With a cut-off an instance may be drawn as its whole box, however little stands
- * in it. */
+static void bound_state(pl_unfolder *u, pl_classes *classes, draft *d)
+{
+    const known_bounds *known = bounds_of(u, classes, d->it.what);
+    const pl_bounds *bounds = &known->bounds;
+    const bool cuts = u->scene->gates != NULL;
+    d->gate = known->gate;
+    d->it.unbounded = bounds->unbounded;
+    d->it.whole = bounds->unbounded || (cuts && bounds->hollow);
+    d->reach = cuts ? d->gate.reach : bounds->reach;
+    bring_up(u, d);
+    d->box = bounds->box;
+    if (bounds->unbounded || pl_box_is_empty(&bounds->box)) return;
+    d->box = d->it.whole ? pl_box_map(&d->map, &bounds->box) : pl_hull_box_under(&d->map, &bounds->hull);
+}
+
+static void bound_leaf(pl_unfolder *u, draft *d)
+{
+    const pl_shape *shape = d->it.kind == PL_NODE_PRIMITIVE ? pl_shape_of(d->it.what) : NULL;
+    pl_box box = pl_box_everything();
+    if (!shape) box = *pl_mesh_box(u->scene->meshes[d->it.what]);
+    else if (shape->support) box = pl_shape_box(shape, d->arguments, NULL);
+    d->it.unbounded = !pl_box_is_empty(&box) && !pl_box_is_finite(&box);
+    d->it.whole = true;
+    d->reach = pl_reach_leaf(d->it.unbounded ? 0.0 : 1.7320508075688774 * pl_box_reach(&box));
+    bring_up(u, d);
+    d->box = box;
+    if (d->it.unbounded || pl_box_is_empty(&box)) return;
+    d->box = shape ? pl_shape_box(shape, d->arguments, d->map.m) : pl_box_map(&d->map, &box);
+}
+
+/* The bounds of a draft in the state's frame. */
 static void bound(pl_unfolder *u, pl_classes *classes, draft *d)
 {
-    pl_lazy_item *it = &d->it;
-    pl_bounds leaf;
-    if (it->kind == PL_NODE_ENTER) {
-        const known_bounds *known = bounds_of(u, classes, it->what);
-        const bool whole = u->scene->gates != NULL, empty = pl_box_is_empty(&known->bounds.box);
-        d->gate = known->gate;
-        d->box = known->bounds.box;
-        d->reach = whole ? d->gate.reach : known->bounds.reach;
-        it->unbounded = known->bounds.unbounded;
-        bring_up(u, d);
-        d->shrinks = !it->unbounded && !empty && !(whole && known->bounds.hollow);
-        if (!d->shrinks) return;
-        const pl_box content = pl_hull_box_under(&d->map, &known->bounds.hull);
-        d->content = widened(&content, d->slack);
-        return;
-    }
-    if (it->kind == PL_NODE_MESH) {
-        pl_bounds_of_box(pl_mesh_box(u->scene->meshes[it->what]), &leaf);
-    } else {
-        const pl_shape *shape = pl_shape_of(it->what);
-        const pl_box box = shape->support ? pl_shape_box(shape, d->arguments, NULL) : pl_box_everything();
-        pl_bounds_of_box(&box, &leaf);
-    }
-    d->box = leaf.box;
-    d->reach = leaf.reach;
-    it->unbounded = leaf.unbounded;
-    bring_up(u, d);
+    if (d->it.kind == PL_NODE_ENTER) bound_state(u, classes, d);
+    else bound_leaf(u, d);
+    if (d->it.unbounded || pl_box_is_empty(&d->box)) return;
+    d->box = widened(&d->box, d->slack);
+    if (pl_box_is_finite(&d->box)) return;
+    d->box = pl_box_everything();
+    d->it.unbounded = d->it.whole = true;
+}
+
+/* Whether both enter states of the same bounds: then they share them. */
+static bool is_gate_of(const draft *d, const draft *before)
+{
+    return before && memcmp(&d->gate, &before->gate, sizeof d->gate) == 0;
 }
 
 static bool add_draft(pl_unfolder *u, pl_classes *classes, uint8_t kind, uint32_t what)
@@ -223,7 +232,9 @@ static bool add_draft(pl_unfolder *u, pl_classes *classes, uint8_t kind, uint32_
     if (kind == PL_NODE_ENTER) {
         uint64_t *words = pl_array_extend(&u->scopes, pl_scope_words(walk->program, &walk->scope) - walk->scope.draws);
         if (!words) return false;
-        u->entered++;
+        const draft *before = u->last_entered ? (const draft *)u->drafts.data + u->last_entered - 1 : NULL;
+        u->gates += !is_gate_of(&d, before);
+        u->last_entered = u->drafts.count + 1;
         u->entered_transforms += d.it.transform_count;
         /* Draws end with the application. */
         const uint32_t draws = u->walk.scope.draws;
@@ -240,7 +251,7 @@ static bool add_draft(pl_unfolder *u, pl_classes *classes, uint8_t kind, uint32_
 static bool derive(pl_unfolder *u, pl_classes *classes, pl_error *error)
 {
     bool ok = true;
-    u->entered = u->primitives = u->entered_transforms = u->drafts.count = u->chain.count = u->transforms.count = u->computed.count = u->terms.count = u->scopes.count = 0;
+    u->primitives = u->gates = u->entered_transforms = u->last_entered = u->drafts.count = u->chain.count = u->transforms.count = u->computed.count = u->terms.count = u->scopes.count = 0;
     while (ok) {
         u->work += EVENT_WORK;
         switch (pl_walk_next(&u->walk, error)) {
@@ -261,22 +272,21 @@ static bool derive(pl_unfolder *u, pl_classes *classes, pl_error *error)
 
 /* The parts of a state's block, in this order; all sizes are multiples of 8. */
 typedef struct layout {
-    size_t items, enters, computed, transforms, stretches, scopes, key, arguments, terms, total;
+    size_t items, computed, transforms, gates, scopes, key, arguments, terms, total;
 } layout;
 
 static layout layout_of(const pl_unfolder *u)
 {
     layout l = {.items = u->drafts.count * sizeof(pl_lazy_item),
-                .enters = u->entered * sizeof(pl_lazy_enter),
                 .computed = u->computed.count * MAP_BYTES,
                 .transforms = u->transforms.count * sizeof(pl_transform *),
-                .stretches = u->scene->gates ? u->entered_transforms * sizeof(double) : 0,
+                .gates = u->gates * sizeof(pl_gate_box),
                 .scopes = u->scopes.count * sizeof(uint64_t),
                 .key = u->key.count * sizeof(uint64_t),
                 .arguments = u->primitives * PL_SHAPE_ARGUMENTS * sizeof(double),
                 .terms = (u->terms.count + 1) / 2 * 2 * sizeof(uint32_t)};
-    l.total = sizeof(pl_lazy_state) + l.items + l.enters + l.computed + l.transforms + l.stretches + l.scopes + l.key +
-              l.arguments + l.terms;
+    if (u->scene->gates) l.transforms += u->entered_transforms * sizeof(double);
+    l.total = sizeof(pl_lazy_state) + l.items + l.computed + l.transforms + l.gates + l.scopes + l.key + l.arguments + l.terms;
     return l;
 }
 
@@ -298,63 +308,72 @@ static void write_box(const pl_box *box, float planes[6])
     }
 }
 
-static void write_enter(const draft *d, pl_lazy_enter *enter)
+/* Where the next of each kind goes. */
+typedef struct cursor {
+    char *maps;
+    const pl_transform **transforms;
+    pl_gate_box *gate;
+    uint64_t *scopes;
+    double *arguments;
+    uint32_t *terms;
+    const draft *before; /* the last one that entered a state */
+} cursor;
+
+/* An item's transformations and, of an enter item with cut-offs, their stretches. */
+static void write_transforms(const pl_unfolder *u, const draft *d, cursor *c, pl_lazy_item *it)
 {
-    float content[6];
-    write_box(d->shrinks ? &d->content : &d->box, content);
-    enter->gate = d->gate;
-    enter->shrinks = d->shrinks;
-    atomic_init(&enter->state, NULL);
-    for (int i = 0; i < 6; i++) atomic_init(&enter->content[i], content[i]);
-    for (int i = 0; i < 12; i++) enter->to_parent[i] = (float)d->map.m[i];
-    enter->slack = pl_round_up(d->slack);
+    const link_ *links = (const link_ *)u->transforms.data + d->transform_first;
+    it->transforms = c->transforms;
+    for (uint32_t i = 0; i < it->transform_count; i++)
+        *c->transforms++ = links[i].constant ? links[i].constant : (const pl_transform *)(c->maps + links[i].computed * MAP_BYTES);
+    if (it->kind != PL_NODE_ENTER || !u->scene->gates) return;
+    double *stretches = (double *)c->transforms;
+    for (uint32_t i = 0; i < it->transform_count; i++) *stretches++ = link_transform(u, &links[i])->stretch;
+    c->transforms = (const pl_transform **)stretches;
+}
+
+static void write_item(const pl_unfolder *u, const draft *d, cursor *c, pl_lazy_item *it)
+{
+    *it = d->it;
+    write_box(&d->box, it->box);
+    write_transforms(u, d, c, it);
+    it->terms = c->terms + d->term_first;
+    atomic_init(&it->state, NULL);
+    if (it->kind == PL_NODE_PRIMITIVE) {
+        memcpy(c->arguments, d->arguments, sizeof d->arguments);
+        it->arguments = c->arguments;
+        c->arguments += PL_SHAPE_ARGUMENTS;
+    } else if (it->kind == PL_NODE_ENTER) {
+        if (!is_gate_of(d, c->before)) *c->gate++ = d->gate;
+        it->gate = c->gate - 1;
+        it->scope = c->scopes + d->scope_first;
+        c->before = d;
+    }
 }
 
 pl_lazy_state *pl_unfolder_write(pl_unfolder *u, uint32_t symbol, uint64_t hash, void *memory)
 {
     const layout l = layout_of(u);
     pl_lazy_state *state = memory;
-    pl_lazy_item *items = (pl_lazy_item *)(state + 1);
-    char *at = (char *)items + l.items;
-    pl_lazy_enter *enter = (pl_lazy_enter *)at;
-    char *maps = at += l.enters;
-    const pl_transform **list = (const pl_transform **)(at += l.computed);
-    double *stretches = (double *)(at += l.transforms);
-    uint64_t *words = (uint64_t *)(at += l.stretches);
+    char *at = (char *)state->items + l.items;
+    cursor c = {.maps = at};
+    c.transforms = (const pl_transform **)(at += l.computed);
+    c.gate = (pl_gate_box *)(at += l.transforms);
+    c.scopes = (uint64_t *)(at += l.gates);
     uint64_t *key = (uint64_t *)(at += l.scopes);
-    double *arguments = (double *)(at += l.key);
-    uint32_t *terms = (uint32_t *)(at + l.arguments);
+    c.arguments = (double *)(at += l.key);
+    c.terms = (uint32_t *)(at + l.arguments);
     for (size_t i = 0; i < u->computed.count; i++)
-        memcpy(maps + i * MAP_BYTES, (const pl_transform *)u->computed.data + i, MAP_BYTES);
-    if (l.scopes) memcpy(words, u->scopes.data, l.scopes);
+        memcpy(c.maps + i * MAP_BYTES, (const pl_transform *)u->computed.data + i, MAP_BYTES);
+    if (l.scopes) memcpy(c.scopes, u->scopes.data, l.scopes);
     if (l.key) memcpy(key, u->key.data, l.key);
-    if (u->terms.count) memcpy(terms, u->terms.data, u->terms.count * sizeof *terms);
-    for (size_t i = 0; i < u->transforms.count; i++) {
-        const link_ *link = (const link_ *)u->transforms.data + i;
-        list[i] = link->constant ? link->constant : (const pl_transform *)(maps + link->computed * MAP_BYTES);
-    }
+    if (u->terms.count) memcpy(c.terms, u->terms.data, u->terms.count * sizeof *c.terms);
     *state = (pl_lazy_state){.hash = hash, .symbol = symbol, .key_words = (uint32_t)u->key.count,
-                             .item_count = (uint32_t)u->drafts.count, .key = key, .items = items};
-    for (size_t i = 0; i < u->drafts.count; i++) {
-        draft *d = (draft *)u->drafts.data + i;
-        write_box(&d->box, d->it.box);
-        d->it.transforms = list + d->transform_first;
-        d->it.terms = terms + d->term_first;
-        if (d->it.kind == PL_NODE_PRIMITIVE) {
-            memcpy(arguments, d->arguments, sizeof d->arguments);
-            d->it.arguments = arguments;
-            arguments += PL_SHAPE_ARGUMENTS;
-        } else if (d->it.kind == PL_NODE_ENTER) {
-            write_enter(d, enter);
-            enter->scope = words + d->scope_first;
-            enter->stretches = l.stretches ? stretches : NULL;
-            for (uint32_t k = 0; l.stretches && k < d->it.transform_count; k++)
-                *stretches++ = link_transform(u, (const link_ *)u->transforms.data + d->transform_first + k)->stretch;
-            d->it.enter = enter++;
-        }
-        items[i] = d->it;
-        if (d->it.unbounded) state->unbounded = true;
-        else pl_reach_join(&state->reach, &d->reach);
+                             .item_count = (uint32_t)u->drafts.count, .key = key};
+    for (uint32_t i = 0; i < state->item_count; i++) {
+        const draft *d = (const draft *)u->drafts.data + i;
+        write_item(u, d, &c, &state->items[i]);
+        if (!d->it.unbounded) pl_reach_join(&state->reach, &d->reach);
     }
     return state;
 }
