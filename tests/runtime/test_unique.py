@@ -90,6 +90,30 @@ def test_cut_offs_are_the_same_in_every_accelerator_and_budget(px):
         assert ("accelerator" in options) != (counts["lazy"]["unfolded"] > 0)
 
 
+def test_instances_that_may_be_empty_are_cut_the_same_in_every_accelerator():
+    """Half of all twigs have nothing in them, which isn't known of their classes: their boxes may stand far from all else."""
+    text = FOREST.replace("Tree -> 3: T_scale cylinder | 1: [ scale 0.2 ] sphere;", "if (bend < 30) Tree -> [ trans 0 0 5 ] T_scale cylinder;")
+    assert text != FOREST
+    data = build(Source("forest.plsys", (text % (4, 7)).encode())).encode()
+    for px in (0.5, 4.0):
+        expected, counts = picture(data, accelerator="none", detail=px, threads=2)
+        assert counts["cut"]["instances"] > 0
+        found, counts = picture(data, detail=px)
+        assert counts["lazy"]["unfolded"] > 0
+        for name, values in expected.items():
+            np.testing.assert_array_equal(found[name], values, err_msg=f"{px} {name}")
+
+
+def test_a_cut_off_is_the_same_while_states_are_thrown_out():
+    """Rays let go of all states on their way and find them again, with the spans of what they had passed."""
+    data = forest(4, 10)
+    expected, _ = picture(data, accelerator="none", detail=0.2, threads=2)
+    found, counts = picture(data, memory=20_000_000, detail=0.2, threads=2)
+    assert counts["lazy"]["evicted"] > 0
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values, err_msg=name)
+
+
 def test_a_cut_off_keeps_what_a_forest_covers_and_unfolds_less():
     data = forest(4, 7)
 
