@@ -238,43 +238,55 @@ static inline int visit_tile(pl_tracer *tracer, traveller *r, pl_ref ref, bool a
 static inline pl_ref next_tile(traveller *r, uint64_t *steps)
 {
     const pl_front_node *nodes = r->terrain->front.nodes;
-    while (r->top) {
-        const uint64_t entry = r->stack[--r->top];
+    uint64_t *stack = r->stack, taken = 0;
+    size_t top = r->top;
+    pl_ref found = PL_NOTHING;
+    while (top) {
+        const uint64_t entry = stack[--top];
         pl_ref ref = (pl_ref)entry;
         if (entry_is_beyond(entry, r->n.t_max)) continue;
         while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
-            const unsigned count = meet(&r->n, &nodes[ref], r->stack + r->top, &ref);
-            ++*steps;
+            const unsigned count = meet(&r->n, &nodes[ref], stack + top, &ref);
+            taken++;
             if (count == 0) goto next;
-            r->top += count - 1;
+            top += count - 1;
         }
-        ++*steps;
-        return ref;
+        taken++;
+        found = ref;
+        break;
     next:;
     }
-    return PL_NOTHING;
+    r->top = top;
+    *steps += taken;
+    return found;
 }
 
-/* Sets out a ray whose terrain, frame, o, d, query and stack are set; false: it misses the terrain. */
-static inline bool set_out(traveller *r)
+/* Sets out a ray of the terrain's frame; false: it misses the terrain. */
+static inline bool set_out(traveller *r, const pl_terrain *terrain, pl_frame *f, const double o[3], const double d[3],
+                           pl_query *query, uint64_t *stack)
 {
-    const pl_front *front = &r->terrain->front;
-    pl_frame *f = r->frame;
-    const double4 origin = {r->o[0], r->o[1], r->o[2]}, direction = {r->d[0], r->d[1], r->d[2]};
+    const pl_front *front = &terrain->front;
+    r->terrain = terrain;
+    r->frame = f;
+    r->o = o;
+    r->d = d;
+    r->query = query;
+    r->stack = stack;
+    const double4 origin = {o[0], o[1], o[2]}, direction = {d[0], d[1], d[2]};
     const double4 from = (origin - *(const double4 *)front->centre) * front->scale, along = direction * front->scale;
     float local_max = 1e30f;
     f->front = front;
     f->error = 0.0f;
     f->distance = (float)__builtin_fabs(from[0]) + (float)__builtin_fabs(from[1]) + (float)__builtin_fabs(from[2]);
     f->distance *= 1.0f + 0x1p-20f;
-    f->t0 = r->query->t_min;
+    f->t0 = query->t_min;
     f->rate = 1.0;
-    if (!begin_frame(f, from + r->query->t_min * along, along, r->query->t_max, &local_max)) return false;
+    if (!begin_frame(f, from + query->t_min * along, along, query->t_max, &local_max)) return false;
     const float *v = f->direction;
     r->inverse_square = 1.0f / (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     look(&r->n, f);
-    r->n.t_max = local_t_max(f, r->query->t_max);
-    r->stack[0] = entry_of(0.0f, front->root);
+    r->n.t_max = local_t_max(f, query->t_max);
+    stack[0] = entry_of(0.0f, front->root);
     r->top = 1;
     return true;
 }
@@ -295,9 +307,9 @@ bool TERRAIN_KERNEL(pl_tracer *tracer, const pl_terrain *terrain, const double o
 {
     pl_bvh_work *w = tracer->work;
     if (w->stack_capacity < terrain->stack_need && !pl_bvh_grow_stack(w, terrain->stack_need, query->error)) return false;
-    traveller r = {.terrain = terrain, .frame = w->frames, .o = o, .d = d, .query = query, .stack = w->stack};
+    traveller r;
     bool ok = true;
-    if (set_out(&r)) ok = query->kind == PL_QUERY_ANY ? travel(tracer, &r, true) : travel(tracer, &r, false);
+    if (set_out(&r, terrain, w->frames, o, d, query, w->stack)) ok = query->kind == PL_QUERY_ANY ? travel(tracer, &r, true) : travel(tracer, &r, false);
     wide_end();
     return ok;
 }

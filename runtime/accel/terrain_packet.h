@@ -184,9 +184,9 @@ static bool travel_as_stream(pl_tracer *tracer, const pl_terrain *terrain, const
     unsigned going = 0;
     for (unsigned i = 0; i < count; i++) {
         traveller *r = &travellers[going];
-        *r = (traveller){.terrain = terrain, .frame = &frames[going], .o = rays[i].origin, .d = rays[i].direction,
-                         .query = &queries[i], .stack = stacks + i * terrain->stack_need};
-        if (!set_out(r) || (next[going] = next_tile(r, &steps)) == PL_NOTHING) continue;
+        if (!set_out(r, terrain, &frames[going], rays[i].origin, rays[i].direction, &queries[i], stacks + i * terrain->stack_need) ||
+            (next[going] = next_tile(r, &steps)) == PL_NOTHING)
+            continue;
         fetch_tile(terrain, next[going++]);
     }
     while (going) {
