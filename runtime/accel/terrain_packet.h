@@ -103,31 +103,35 @@ typedef struct convoy {
     beam beam;
 } convoy;
 
-/* Tests a cluster's triangles with the rays that meet its box. false: an error. */
+/* Tests a cluster's triangles with the rays that meet its box. false: an error. First all filters and then the candidates: so
+ * processors needn't guess, a ray at a time, whether there is one. */
 static inline bool visit_cluster_beam(pl_tracer *tracer, convoy *c, const sights *all, uint32_t tile, uint32_t cluster)
 {
     const pl_terrain_tile *it = pl_terrain_tile_at(c->terrain, tile);
     const unsigned there = facets_of(c->terrain, cluster);
-    unsigned lanes = there ? lanes_in_cluster(c->frame, &c->beam, it, cluster) : 0;
-    bool found = false;
+    unsigned lanes = there ? lanes_in_cluster(c->frame, &c->beam, it, cluster) : 0, left[PL_LANES], hit = 0;
     facets f;
     if (!lanes) return true;
     unpack_cluster(it, cluster, all->slack, &f);
+    tracer->counters.filtered += PL_TERRAIN_CLUSTER * (unsigned)__builtin_popcount(lanes);
     for (; lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
         const sight s = sight_in_lane(all, lane);
-        tracer->counters.filtered += PL_TERRAIN_CLUSTER;
-        unsigned left = filter_eight(&s, &f, c->frame->t_max[lane], false, NULL) & there;
-        for (; left; left &= left - 1) {
-            const uint32_t leaf = cluster * PL_TERRAIN_CLUSTER + (uint32_t)__builtin_ctz(left);
-            const pl_ray *ray = &c->rays[lane];
-            wide_end();
-            if (!pl_terrain_candidate(tracer, c->terrain, tile, leaf, ray->origin, ray->direction, &c->queries[lane])) return false;
-            c->t_max[lane] = c->queries[lane].t_max;
-            found = true;
-        }
+        left[lane] = filter_eight(&s, &f, c->frame->t_max[lane], false, NULL) & there;
+        hit |= (unsigned)(left[lane] != 0) << lane;
     }
-    if (found) set_t_max(c->frame, c->t_max);
+    if (!hit) return true;
+    wide_end();
+    for (; hit; hit &= hit - 1) {
+        const int lane = __builtin_ctz(hit);
+        const pl_ray *ray = &c->rays[lane];
+        for (unsigned rest = left[lane]; rest; rest &= rest - 1) {
+            const uint32_t leaf = cluster * PL_TERRAIN_CLUSTER + (uint32_t)__builtin_ctz(rest);
+            if (!pl_terrain_candidate(tracer, c->terrain, tile, leaf, ray->origin, ray->direction, &c->queries[lane])) return false;
+        }
+        c->t_max[lane] = c->queries[lane].t_max;
+    }
+    set_t_max(c->frame, c->t_max);
     return true;
 }
 
