@@ -77,8 +77,8 @@ static inline unsigned lanes_in_cluster(const pl_packet_frame *f, const beam *b,
     unsigned met = 0;
     for (int axis = 0; axis < 3; axis++) {
         const float toward = b->near_row[axis] < b->far_row[axis] ? f->slack : -f->slack;
-        near[axis] = tile->lo[axis] + tile->step[axis] * tile->planes[0][b->near_row[axis] + cluster] - toward;
-        far[axis] = tile->lo[axis] + tile->step[axis] * tile->planes[0][b->far_row[axis] + cluster] + toward;
+        near[axis] = tile->lo[axis] + tile->step[axis] * tile->planes[b->near_row[axis] / PL_FRONT_WIDTH][cluster] - toward;
+        far[axis] = tile->lo[axis] + tile->step[axis] * tile->planes[b->far_row[axis] / PL_FRONT_WIDTH][cluster] + toward;
     }
     for (int first = 0; first < PL_LANES; first += HALF) {
         wide enter = wide_set(0.0f), leave = wide_load(f->t_max + first);

@@ -8,11 +8,13 @@ from pathlib import Path
 import pytest
 import whole
 from assembly import one_of_everything
+from wooded_hills import WOODED
 
 from plsys.compiler import compile
 
 ROOT = Path(__file__).resolve().parents[2]
-SCENES = {"tree": {"order": 5}, "tree3d": {"order": 4}, "mirrors": {}, "shading": {}, "palm": {"rings": 6, "fronds": 4}}
+SCENES = {"tree": {"order": 5}, "tree3d": {"order": 4}, "mirrors": {}, "shading": {}, "palm": {"rings": 6, "fronds": 4},
+          "terrain": {"level": 4}}  # fmt: skip
 
 
 @pytest.mark.parametrize("variant", ["plain", "sanitized"])
@@ -23,13 +25,15 @@ def test_shapes(source, variant):
 
 
 @pytest.mark.parametrize("variant", ["plain", "sanitized", "threads"])
-@pytest.mark.parametrize("scene", ["everything", *SCENES])
+@pytest.mark.parametrize("scene", ["everything", "wooded hills", *SCENES])
 def test_every_way_of_tracing_gives_the_same_hits(scene, variant, tmp_path):
-    data = one_of_everything().bytes() if scene == "everything" else compile(
-        ROOT / "scenes" / f"{scene}.plsys", parameters=SCENES[scene]
-    )
     path = tmp_path / "scene.plsb"
-    path.write_bytes(data)
+    if scene == "everything":
+        path.write_bytes(one_of_everything().bytes())
+    elif scene == "wooded hills":
+        path.write_bytes(compile(WOODED, parameters={"level": 4}))
+    else:
+        path.write_bytes(compile(ROOT / "scenes" / f"{scene}.plsys", parameters=SCENES[scene]))
     done = whole.run(whole.program("accel/rays.c", variant), path)
     assert done.returncode == 0, done.stdout + done.stderr
 

@@ -3,12 +3,15 @@ subdivision isn't taken for one."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from test_fronts import answers, assert_same, available
 from test_packets import bundles
+from wooded_hills import WOODED
 from plsys.compiler import compile
 from plsys.runtime import Scene
 
@@ -219,37 +222,6 @@ def test_what_is_no_regular_subdivision_is_not_taken_for_one(what):
     )
 
 
-# Beside hills: trees on them, found by the same subdivision, more hills after these, and shapes.
-WOODED = (
-    SCENE.read_text().replace("object { Hills }", """
-sphere { <20, 20, 4>, 3 }
-object { Woods }
-object { Hills texture { pigment { color rgb 1 } } no_shadow }
-object { Woods translate <3, 2, 4> }
-object { Hills scale <0.5, 0.5, 0.2> translate <-20, 10, 0> }
-box { <30, 5, 0>, <34, 9, 6> texture { pigment { color rgb <1, 0, 0> } } }
-""")
-    + """
-Selection Woods { Woods -> Wood(2, relief, 0, 0, -3, 64, 0, -3, 64, 64, 8) + Wood(2, relief, 64, 64, 8, 0, 64, 1, 0, 0, -3); }
-Selection Wood(n, rough, xa, ya, za, xb, yb, zb, xc, yc, zc)
-{
-    if (n > 0)
-        Wood -> C_middles ( Wood(n - 1, rough / 2, xa, ya, za, xab, yab, zab, xca, yca, zca)
-                          + Wood(n - 1, rough / 2, xab, yab, zab, xb, yb, zb, xbc, ybc, zbc)
-                          + Wood(n - 1, rough / 2, xca, yca, zca, xbc, ybc, zbc, xc, yc, zc) );
-    else
-        Wood -> [ trans xa ya za ] Tree(4);
-}
-Selection Tree(k)
-{
-    if (k > 0) Tree -> Bark [ scale 0.3 0.3 3 ] cylinder + [ trans 0 0 3; roty 35; scale 0.75 ] Tree(k - 1) + [ trans 0 0 3; roty -35; rotz 80; scale 0.7 ] Tree(k - 1);
-    else       Tree -> sphere;
-}
-Texture Bark { pigment { color rgb <0.4, 0.3, k/4> } }
-"""
-)  # fmt: skip
-
-
 def test_trees_stand_on_hills():
     data = compile(WOODED, parameters={"level": 4})
     with Scene(data) as scene:
@@ -285,3 +257,27 @@ def test_what_has_too_many_states_beside_hills_is_unfolded_on_touch():
     data = compile(text, parameters={"level": 4})
     with Scene(data) as scene:
         assert scene.statistics["terrain"]["tiles"] == scene.statistics["front"]["count"] == 0
+
+
+PROBE = """
+import resource, sys
+from plsys.runtime import Scene
+with Scene(open(sys.argv[1], "rb").read(), memory=int(sys.argv[2]), threads=1) as scene:
+    scene.render(64, 48)
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, scene.statistics["terrain"]["tiles"])
+"""
+
+
+def peak(path: Path, level: int, memory: int) -> tuple[int, int]:
+    path.write_bytes(compile(SCENE, parameters={"level": level}))
+    done = subprocess.run([sys.executable, "-c", PROBE, path, str(memory)], capture_output=True, text=True, check=True)
+    return tuple(map(int, done.stdout.split()))
+
+
+def test_the_process_stays_under_the_budget(tmp_path):
+    """Its peak, building included, less that of a process with next to no scene."""
+    without, _ = peak(tmp_path / "small.plsb", 0, 1 << 20)
+    for level, budget in ((6, 256 << 10), (8, 3 << 20), (9, 11 << 20)):
+        with_, found = peak(tmp_path / "large.plsb", level, budget)
+        assert found == 2 * 4 ** (level - 3)
+        assert with_ - without <= 1.1 * budget + (512 << 10), budget
