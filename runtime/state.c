@@ -241,6 +241,9 @@ static bool remember_node(builder *b)
 static bool add_item(builder *b, uint8_t kind, uint32_t what)
 {
     pl_walk *walk = &b->walk;
+    if (walk->at.marks[3] > UINT16_MAX)
+        return pl_fail_at(b->error, PL_ERROR_LIMIT, walk->program, walk->node, "a texture below more than %d transformations",
+                          UINT16_MAX);
     pl_item item = {.kind = kind,
                     .no_shadow = walk->at.no_shadow,
                     .what = what,
@@ -248,7 +251,7 @@ static bool add_item(builder *b, uint8_t kind, uint32_t what)
                     .term_count = walk->at.terms,
                     .rule = walk->at.rule,
                     .texture = (int32_t)walk->at.marks[2] - 1,
-                    .texture_transforms = walk->at.marks[3],
+                    .texture_transforms = (uint16_t)walk->at.marks[3],
                     .texture_code = walk->at.marks[4]};
     if (kind == PL_NODE_PRIMITIVE) memcpy(item.arguments, walk->arguments, sizeof item.arguments);
     item.transforms = keep(b, b->chain.data, item.transform_count * sizeof *item.transforms);

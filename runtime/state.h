@@ -21,8 +21,10 @@
 #include "shapes/mesh.h"
 
 typedef struct pl_item {
-    uint8_t kind;    /* PL_NODE_PRIMITIVE, PL_NODE_MESH or PL_NODE_ENTER */
-    bool no_shadow;  /* below no_shadow within this application */
+    uint8_t kind;          /* PL_NODE_PRIMITIVE, PL_NODE_MESH or PL_NODE_ENTER */
+    bool no_shadow : 1;    /* below no_shadow within this application */
+    bool texture_code : 1; /* `texture` has values to be computed from parameters */
+    uint16_t texture_transforms; /* `texture` is below so many of the transformations */
     uint32_t what;   /* shape id, mesh index, or state index */
     uint32_t transform_count, term_count;
     const pl_transform *const *transforms; /* outermost first */
@@ -30,9 +32,7 @@ typedef struct pl_item {
     double arguments[PL_SHAPE_ARGUMENTS];
     uint64_t first; /* primitives of this state before this item */
     int32_t rule;                /* the innermost rule within this application, -1: none */
-    int32_t texture;             /* the innermost texture node within it, -1: none … */
-    uint32_t texture_transforms; /* … below so many of the transformations */
-    bool texture_code;           /* a texture of the application has values to be computed from parameters */
+    int32_t texture;             /* the innermost texture node within it, -1: none */
 } pl_item;
 
 /* The items on the way from the scene to a leaf. */

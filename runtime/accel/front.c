@@ -191,7 +191,7 @@ static void add_to(pl_fronts *sums, const pl_front *front, const pl_front_counts
     sums->node_bytes += rounded(front->node_count * sizeof *front->nodes);
     sums->item_bytes += rounded(counts->primitives * sizeof *front->primitives) +
                         rounded(counts->instances * pl_front_instance_bytes(front->fine)) +
-                        rounded(counts->opened * sizeof *front->opened) +
+                        counts->opened * sizeof *front->opened +
                         (front->unbounded_count + 1) * sizeof *front->unbounded;
 }
 

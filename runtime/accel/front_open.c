@@ -435,7 +435,7 @@ bool pl_front_open(const pl_front_plan *plan, const pl_front *front, int threads
     items->instances = allocate(items->instance_count, pl_front_instance_bytes(plan->fine));
     items->places = (pl_front_place *)(items->instances + items->instance_count);
     items->fine = plan->fine ? (pl_front_fine *)(items->places + items->instance_count) : NULL;
-    items->opened = allocate(items->opened_count, sizeof *items->opened);
+    items->opened = malloc(items->opened_count * sizeof *items->opened);
     items->boxes = allocate(items->box_count, sizeof *items->boxes);
     bool ok = items->primitives && items->instances && items->opened && items->boxes;
     opening o = {.plan = plan, .front = front, .items = items};
