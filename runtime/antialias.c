@@ -80,44 +80,37 @@ void pl_sampler_begin_tile(pl_sampler *sampler, int left, int top)
     sampler->tile_stamp++;
 }
 
-void pl_sampler_ahead(pl_sampler *sampler, int x, int y)
+static void direction_at(const pl_sampler *sampler, double x, double y, double direction[3])
 {
     const pl_view *view = pl_shader_view(sampler->shader);
-    const int width = sampler->options->width, height = sampler->options->height;
-    double directions[PL_BLOCK * PL_BLOCK][3];
-    unsigned count = 0;
-    if (sampler->options->antialias != PL_AA_OFF) return;
-    for (int row = y; row < y + PL_BLOCK && row < height; row++)
-        for (int column = x; column < x + PL_BLOCK && column < width; column++)
-            pl_camera_direction(&view->camera, column + 0.5, row + 0.5, width, height, directions[count++]);
-    pl_shade_ahead(sampler->shader, directions, count);
-}
-
-/* The colour at an image point. */
-static bool color_at(const pl_sampler *sampler, double x, double y, double color[3], pl_first *first, pl_error *error)
-{
-    const pl_view *view = pl_shader_view(sampler->shader);
-    double direction[3];
     pl_camera_direction(&view->camera, x, y, sampler->options->width, sampler->options->height, direction);
-    if (color) return pl_shade(sampler->shader, direction, color, first, error);
-    return pl_shade_first(sampler->shader, direction, first, error);
 }
 
 /* --- grid: the mean of the centre and of samples² cells' centres --- */
 
+/* Sample 0 is the centre, the others are the cells row by row. */
+static void grid_direction(const pl_sampler *sampler, int x, int y, int sample, double direction[3])
+{
+    const int cells = sampler->options->samples, column = (sample - 1) % cells, row = (sample - 1) / cells;
+    if (sample == 0) direction_at(sampler, x + 0.5, y + 0.5, direction);
+    else
+        direction_at(sampler, ((double)x * cells + column + 0.5) / cells, ((double)y * cells + row + 0.5) / cells,
+                     direction);
+}
+
 static bool grid_pixel(const pl_sampler *sampler, int x, int y, double color[3], pl_first *first, pl_error *error)
 {
-    const int cells = sampler->options->samples;
-    if (!color_at(sampler, x + 0.5, y + 0.5, color, first, error)) return false;
-    for (int row = 0; row < cells; row++)
-        for (int column = 0; column < cells; column++) {
-            double sample[3];
-            if (!color_at(sampler, ((double)x * cells + column + 0.5) / cells, ((double)y * cells + row + 0.5) / cells,
-                          sample, NULL, error))
-                return false;
-            for (int c = 0; c < 3; c++) color[c] += sample[c];
-        }
-    for (int c = 0; c < 3; c++) color[c] /= (double)cells * cells + 1.0;
+    const int count = sampler->options->samples * sampler->options->samples + 1;
+    memset(color, 0, 3 * sizeof *color);
+    for (int from = 0, some; from < count; from += some) {
+        double directions[PL_TRACE_MANY][3], colors[PL_TRACE_MANY][3];
+        some = first && from == 0 ? 1 : count - from < PL_TRACE_MANY ? count - from : PL_TRACE_MANY;
+        for (int i = 0; i < some; i++) grid_direction(sampler, x, y, from + i, directions[i]);
+        if (!pl_shade(sampler->shader, directions, (unsigned)some, colors, from == 0 ? first : NULL, error)) return false;
+        for (int i = 0; i < some; i++)
+            for (int c = 0; c < 3; c++) color[c] += colors[i][c];
+    }
+    for (int c = 0; c < 3; c++) color[c] /= (double)count;
     return true;
 }
 
@@ -127,24 +120,66 @@ typedef struct pl_pixel {
     int x, y;
 } pl_pixel;
 
-/* The sample at (column, row) of a pixel's finest grid, taken when it is first needed. NULL: an error. */
-static const pl_sample *sample_at(pl_sampler *sampler, pl_pixel pixel, int column, int row, pl_error *error)
+/* Samples that are taken together. */
+typedef struct pl_batch {
+    pl_sample *samples[PL_TRACE_MANY];
+    uint64_t stamps[PL_TRACE_MANY];
+    double directions[PL_TRACE_MANY][3];
+    unsigned count;
+} pl_batch;
+
+static bool take(pl_sampler *sampler, pl_batch *batch, pl_error *error)
+{
+    double colors[PL_TRACE_MANY][3];
+    const unsigned count = batch->count;
+    batch->count = 0;
+    if (count == 0) return true;
+    if (!pl_shade(sampler->shader, batch->directions, count, colors, NULL, error)) return false;
+    for (unsigned i = 0; i < count; i++) {
+        pl_sample *sample = batch->samples[i];
+        memcpy(sample->color, colors[i], sizeof sample->color);
+        for (int c = 0; c < 3 && sampler->steps > 1; c++)
+            sample->encoded[c] = pl_pow(fmax(sample->color[c], 0.0), 1.0 / COMPARISON_GAMMA);
+        sample->stamp = batch->stamps[i];
+    }
+    return true;
+}
+
+/* The sample at (column, row) of a pixel's finest grid; *stamp: what it has once it is taken. */
+static pl_sample *sample_at(const pl_sampler *sampler, pl_pixel pixel, int column, int row, uint64_t *stamp)
 {
     const int steps = sampler->steps;
-    pl_sample *sample = &sampler->inner[row * (steps + 1) + column];
-    uint64_t stamp = sampler->pixel_stamp;
     if (column % steps == 0 && row % steps == 0) {
         const int corner_x = pixel.x - sampler->left + column / steps, corner_y = pixel.y - sampler->top + row / steps;
-        sample = &sampler->corners[corner_y * (PL_TILE + 1) + corner_x];
-        stamp = sampler->tile_stamp;
+        *stamp = sampler->tile_stamp;
+        return &sampler->corners[corner_y * (PL_TILE + 1) + corner_x];
     }
-    if (sample->stamp == stamp) return sample;
-    if (!color_at(sampler, pixel.x + (double)column / steps, pixel.y + (double)row / steps, sample->color, NULL, error))
-        return NULL;
-    for (int c = 0; c < 3 && steps > 1; c++)
-        sample->encoded[c] = pl_pow(fmax(sample->color[c], 0.0), 1.0 / COMPARISON_GAMMA);
-    sample->stamp = stamp;
-    return sample;
+    *stamp = sampler->pixel_stamp;
+    return &sampler->inner[row * (steps + 1) + column];
+}
+
+/* Adds a sample to the batch unless it was taken before; a full batch is taken first. */
+static bool want(pl_sampler *sampler, pl_batch *batch, pl_pixel pixel, int column, int row, pl_error *error)
+{
+    uint64_t stamp;
+    pl_sample *sample = sample_at(sampler, pixel, column, row, &stamp);
+    if (sample->stamp == stamp) return true;
+    if (batch->count == PL_TRACE_MANY && !take(sampler, batch, error)) return false;
+    direction_at(sampler, pixel.x + (double)column / sampler->steps, pixel.y + (double)row / sampler->steps,
+                 batch->directions[batch->count]);
+    batch->samples[batch->count] = sample;
+    batch->stamps[batch->count++] = stamp;
+    return true;
+}
+
+/* Takes those samples of a square of `size` steps at (column, row) that lie `apart` from each other. */
+static bool take_square(pl_sampler *sampler, pl_pixel pixel, int column, int row, int size, int apart, pl_error *error)
+{
+    pl_batch batch = {.count = 0};
+    for (int down = 0; down <= size; down += apart)
+        for (int across = 0; across <= size; across += apart)
+            if (!want(sampler, &batch, pixel, column + across, row + down, error)) return false;
+    return take(sampler, &batch, error);
 }
 
 static bool differ(const pl_sample *a, const pl_sample *b, double threshold)
@@ -154,23 +189,25 @@ static bool differ(const pl_sample *a, const pl_sample *b, double threshold)
            threshold;
 }
 
-/* The mean over the square of `size` steps at (column, row). Recurses at most PL_LIMIT_ADAPTIVE deep. */
+/* The mean over the square of `size` steps at (column, row), whose corners are taken. Recurses at most PL_LIMIT_ADAPTIVE
+ * deep. */
 static bool square(pl_sampler *sampler, pl_pixel pixel, int column, int row, int size, double mean[3], pl_error *error)
 {
     const pl_sample *corners[4];
+    const int half = size / 2;
     bool divide = false;
+    uint64_t stamp;
     for (int i = 0; i < 4; i++) {
-        corners[i] = sample_at(sampler, pixel, column + (i & 1 ? size : 0), row + (i & 2 ? size : 0), error);
-        if (!corners[i]) return false;
+        corners[i] = sample_at(sampler, pixel, column + (i & 1 ? size : 0), row + (i & 2 ? size : 0), &stamp);
         for (int j = 0; j < i && size > 1; j++)
             divide = divide || differ(corners[i], corners[j], sampler->options->threshold);
     }
+    if (divide && !take_square(sampler, pixel, column, row, size, half, error)) return false;
     double sum[3] = {0.0, 0.0, 0.0};
     for (int i = 0; i < 4; i++) {
         double quarter[3];
         const double *part = corners[i]->color;
         if (divide) {
-            const int half = size / 2;
             if (!square(sampler, pixel, column + (i & 1 ? half : 0), row + (i & 2 ? half : 0), half, quarter, error))
                 return false;
             part = quarter;
@@ -181,14 +218,43 @@ static bool square(pl_sampler *sampler, pl_pixel pixel, int column, int row, int
     return true;
 }
 
+static bool adaptive_block(pl_sampler *sampler, int x, int y, int columns, int rows, double (*colors)[3], pl_error *error)
+{
+    pl_batch batch = {.count = 0};
+    for (int row = 0; row <= rows; row++)
+        for (int column = 0; column <= columns; column++)
+            if (!want(sampler, &batch, (pl_pixel){x, y}, column * sampler->steps, row * sampler->steps, error)) return false;
+    if (!take(sampler, &batch, error)) return false;
+    for (int i = 0; i < columns * rows; i++) {
+        sampler->pixel_stamp++;
+        if (!square(sampler, (pl_pixel){x + i % columns, y + i / columns}, 0, 0, sampler->steps, colors[i], error)) return false;
+    }
+    return true;
+}
+
+/* --- pixels --- */
+
+bool pl_sampler_block(pl_sampler *sampler, int x, int y, int columns, int rows, double (*colors)[3], pl_error *error)
+{
+    double directions[PL_BLOCK * PL_BLOCK][3];
+    const int count = columns * rows;
+    if (sampler->options->antialias == PL_AA_ADAPTIVE) return adaptive_block(sampler, x, y, columns, rows, colors, error);
+    if (sampler->options->antialias == PL_AA_GRID) {
+        for (int i = 0; i < count; i++)
+            if (!grid_pixel(sampler, x + i % columns, y + i / columns, colors[i], NULL, error)) return false;
+        return true;
+    }
+    pl_camera_directions(&pl_shader_view(sampler->shader)->camera, x, y, columns, rows, sampler->options->width,
+                         sampler->options->height, directions);
+    return pl_shade(sampler->shader, directions, (unsigned)count, colors, NULL, error);
+}
+
 bool pl_sampler_pixel(pl_sampler *sampler, int x, int y, double color[3], pl_first *first, pl_error *error)
 {
-    switch (sampler->options->antialias) {
-    case PL_AA_GRID: return grid_pixel(sampler, x, y, color, first, error);
-    case PL_AA_ADAPTIVE:
-        sampler->pixel_stamp++;
-        return square(sampler, (pl_pixel){x, y}, 0, 0, sampler->steps, color, error) &&
-               (!first || color_at(sampler, x + 0.5, y + 0.5, NULL, first, error));
-    default: return color_at(sampler, x + 0.5, y + 0.5, color, first, error);
-    }
+    double direction[3];
+    if (sampler->options->antialias == PL_AA_GRID) return grid_pixel(sampler, x, y, color, first, error);
+    direction_at(sampler, x + 0.5, y + 0.5, direction);
+    if (sampler->options->antialias == PL_AA_OFF) return pl_shade(sampler->shader, &direction, 1, (double (*)[3])color, first, error);
+    return adaptive_block(sampler, x, y, 1, 1, (double (*)[3])color, error) &&
+           pl_shade_first(sampler->shader, direction, first, error);
 }

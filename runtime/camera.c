@@ -69,12 +69,28 @@ bool pl_camera_create(const double *record, pl_camera *camera, pl_error *error)
     return true;
 }
 
-void pl_camera_direction(const pl_camera *camera, double x, double y, int width, int height, double direction[3])
+/* Through the point that lies by so much of the image's width and height right of and above its middle. */
+static inline void set_direction(const pl_camera *camera, double across, double above, double direction[3])
 {
-    const double across = x / width - 0.5, above = 0.5 - y / height;
     for (int axis = 0; axis < 3; axis++)
         direction[axis] = camera->forward[axis] + across * camera->right[axis] + above * camera->up[axis];
     pl_normalize(direction);
+}
+
+void pl_camera_direction(const pl_camera *camera, double x, double y, int width, int height, double direction[3])
+{
+    set_direction(camera, x / width - 0.5, 0.5 - y / height, direction);
+}
+
+void pl_camera_directions(const pl_camera *camera, int left, int top, int columns, int rows, int width, int height,
+                          double (*directions)[3])
+{
+    double across[PL_CAMERA_COLUMNS];
+    for (int i = 0; i < columns; i++) across[i] = (left + i + 0.5) / width - 0.5;
+    for (int row = 0; row < rows; row++) {
+        const double above = 0.5 - (top + row + 0.5) / height;
+        for (int i = 0; i < columns; i++) set_direction(camera, across[i], above, *directions++);
+    }
 }
 
 double pl_camera_spread(const pl_camera *camera, int width, int height)

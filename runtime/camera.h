@@ -19,6 +19,11 @@ bool pl_camera_create(const double *record, pl_camera *camera, pl_error *error);
 /* The unit direction through the image point (x, y) in pixels, (0, 0) being the upper left corner of the image. */
 void pl_camera_direction(const pl_camera *camera, double x, double y, int width, int height, double direction[3]);
 
+/* Through the centres of columns x rows pixels from (left, top) on, row by row; at most PL_CAMERA_COLUMNS a row. */
+enum { PL_CAMERA_COLUMNS = 16 };
+void pl_camera_directions(const pl_camera *camera, int left, int top, int columns, int rows, int width, int height,
+                          double (*directions)[3]);
+
 /* A pixel's width at unit distance from the eye, in the middle of the image: the larger of across and down. */
 double pl_camera_spread(const pl_camera *camera, int width, int height);
 

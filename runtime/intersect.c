@@ -71,9 +71,9 @@ static unsigned trace_some(job *j, pl_tracer *tracer, size_t first, unsigned cou
     unsigned known = 0, done = 0;
     while (known < count && set_ray(j, first + known, &rays[known], error)) known++;
     if (!j->hits) {
-        int found = 0;
-        for (; done < known && (found = pl_trace_any(tracer, &rays[done], error)) >= 0; done++)
-            j->occluded[first + done] = found > 0;
+        bool blocked[PL_TRACE_MANY];
+        const unsigned traced = pl_trace_any_many(tracer, rays, known, blocked, error);
+        for (; done < traced; done++) j->occluded[first + done] = blocked[done];
         return done;
     }
     unsigned traced = pl_trace_nearest_many(tracer, rays, known, hits, error);

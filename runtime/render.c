@@ -6,6 +6,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 
 #include "antialias.h"
@@ -33,6 +34,9 @@ typedef struct pl_worker {
     pthread_t thread;
     bool reports; /* this one calls the progress function */
     bool started;
+    double color[3]; /* the last one that was written, … */
+    uint8_t srgb[3]; /* … and in picture files: neighbours often are alike */
+    uint16_t linear16[3];
     double first_pixel; /* when this one's first pixel was done; 0: none is */
 } pl_worker;
 
@@ -48,15 +52,24 @@ static void set_vector(float *channel, size_t pixel, const double *value)
     for (int i = 0; channel && i < 3; i++) channel[3 * pixel + i] = value ? (float)value[i] : 0.0f;
 }
 
-/* A pixel's colour, in single precision and in what picture files have of that. */
-static void write_color(const pl_job *job, size_t pixel, const double color[3])
+static void quantise(pl_worker *worker, const double color[3])
 {
-    const pl_channels *channels = job->channels;
+    memcpy(worker->color, color, sizeof worker->color);
+    for (int i = 0; i < 3; i++) {
+        worker->srgb[i] = pl_srgb(&worker->job->quantiser, (float)color[i]);
+        worker->linear16[i] = pl_linear_16((float)color[i]);
+    }
+}
+
+/* A pixel's colour, in single precision and in what picture files have of that. */
+static void write_color(pl_worker *worker, size_t pixel, const double color[3])
+{
+    const pl_channels *channels = worker->job->channels;
     set_vector(channels->color, pixel, color);
-    for (size_t i = 0; channels->srgb && i < 3; i++)
-        channels->srgb[3 * pixel + i] = pl_srgb(&job->quantiser, (float)color[i]);
-    for (size_t i = 0; channels->linear16 && i < 3; i++)
-        channels->linear16[3 * pixel + i] = pl_linear_16((float)color[i]);
+    if (!channels->srgb && !channels->linear16) return;
+    if (memcmp(worker->color, color, sizeof worker->color) != 0) quantise(worker, color);
+    if (channels->srgb) memcpy(channels->srgb + 3 * pixel, worker->srgb, sizeof worker->srgb);
+    if (channels->linear16) memcpy(channels->linear16 + 3 * pixel, worker->linear16, sizeof worker->linear16);
 }
 
 static void set_index(int32_t *channel, size_t pixel, uint64_t value)
@@ -102,19 +115,27 @@ static bool render_block(pl_worker *worker, uint32_t tile, int left, int top, pl
 {
     pl_job *job = worker->job;
     const int width = job->options->width, height = job->options->height;
+    const int columns = width - left < PL_BLOCK ? width - left : PL_BLOCK;
+    const int rows = height - top < PL_BLOCK ? height - top : PL_BLOCK;
+    double colors[PL_BLOCK * PL_BLOCK][3];
     if (is_idle(job, tile)) return true;
-    if (!job->wants_first) pl_sampler_ahead(worker->sampler, left, top);
-    for (int y = top; y < height && y < top + PL_BLOCK; y++)
-        for (int x = left; x < width && x < left + PL_BLOCK; x++) {
+    if (!job->wants_first && !pl_sampler_block(worker->sampler, left, top, columns, rows, colors, error)) return false;
+    const double *color = colors[0];
+    for (int y = top; y < top + rows; y++)
+        for (int x = left; x < left + columns; x++, color += 3) {
             const size_t pixel = (size_t)y * (size_t)width + (size_t)x;
-            double color[3];
+            double alone[3];
             pl_first first;
+            if (!job->wants_first) {
+                write_color(worker, pixel, color);
+                continue;
+            }
             if (is_idle(job, tile)) return true;
-            if (!pl_sampler_pixel(worker->sampler, x, y, color, job->wants_first ? &first : NULL, error)) return false;
-            if (worker->first_pixel == 0.0) worker->first_pixel = seconds();
-            write_color(job, pixel, color);
-            if (job->wants_first) write_first(job->channels, pixel, &first);
+            if (!pl_sampler_pixel(worker->sampler, x, y, alone, &first, error)) return false;
+            write_color(worker, pixel, alone);
+            write_first(job->channels, pixel, &first);
         }
+    if (worker->first_pixel == 0.0) worker->first_pixel = seconds();
     return true;
 }
 
@@ -162,6 +183,7 @@ static bool prepare(pl_worker *workers, int count, pl_job *job, const pl_view *v
     for (int i = 0; i < count; i++) {
         workers[i].job = job;
         workers[i].reports = i == 0;
+        quantise(&workers[i], (const double[3]){0.0, 0.0, 0.0});
         workers[i].shader = pl_shader_create(view, error);
         if (!workers[i].shader) return false;
         workers[i].sampler = pl_sampler_create(workers[i].shader, job->options, error);

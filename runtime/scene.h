@@ -45,6 +45,7 @@ struct pl_tracer {
     pl_walk walk; /* of pl_trace_surface */
     pl_chain chain;
     double *texture; /* values that code fills in */
+    uint32_t *first_textures; /* by state: what surface.c found of the first texture below; NULL: nothing yet */
     pl_path scratch, spare;
     pl_items items;
     struct pl_hit_list *list;

@@ -27,30 +27,43 @@ typedef struct pl_bounce {
     uint32_t level;
 } pl_bounce;
 
-struct pl_shader {
-    const pl_view *view;
-    pl_tracer *tracer;
-    pl_hit hit, blocker; /* of the ray being shaded; of its shadow ray */
-    pl_bounce *waiting;
-    size_t count, capacity;
-    uint32_t sample_rays;
-    pl_ray_counts rays;
-    /* The eye's rays that were traced before they are asked for, and the next of them. */
-    pl_ray ahead[PL_TRACE_MANY];
-    pl_hit ahead_hits[PL_TRACE_MANY];
-    unsigned ahead_count, ahead_next;
-};
-
 /* One hit while it is shaded. */
 typedef struct pl_spotted {
     const pl_bounce *ray;
+    bool found; /* false: the ray met nothing, and the rest is unspecified */
     double point[3], normal[3]; /* turned against the ray */
     double flat[3];             /* the surface's own normal, to either side */
     double width;               /* of the pixel's footprint here */
     double epsilon;             /* rounding error of the point, in our own tolerances */
     pl_pigment pigment;
     pl_finish finish;
+    double total[3]; /* its own light, as far as it is added up */
 } pl_spotted;
+
+/* One light on one of several hits, while shadows are traced. */
+typedef struct pl_shine {
+    pl_spotted *at;
+    double towards[3], distance;
+    double color[3]; /* that arrives … */
+    double share[3]; /* … and what the surface's own colour shows of it */
+} pl_shine;
+
+struct pl_shader {
+    const pl_view *view;
+    pl_tracer *tracer;
+    pl_bounce *waiting;
+    size_t count, capacity;
+    uint32_t sample_rays;
+    pl_ray_counts rays;
+    /* Rays that are traced together, and what they meet: those of the eye, of one bounce, or towards one light. */
+    pl_ray traced[PL_TRACE_MANY];
+    pl_ray eye_rays[PL_TRACE_MANY]; /* as eyes: all but their directions is the same for all samples */
+    pl_hit hits[PL_TRACE_MANY];
+    bool blocked[PL_TRACE_MANY];
+    pl_shine shines[PL_TRACE_MANY];
+    pl_bounce eyes[PL_TRACE_MANY];
+    pl_spotted spotted[PL_TRACE_MANY];
+};
 
 bool pl_view_create(pl_view *view, const pl_scene *scene, pl_error *error)
 {
@@ -84,6 +97,37 @@ void pl_view_free(pl_view *view)
     view->light_count = 0;
 }
 
+/* --- the eye --- */
+
+/* Written in place: a structure that is put together and then copied waits for its parts to reach the cache. */
+static void set_ray(const pl_view *view, const pl_bounce *bounce, pl_ray *ray)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        ray->origin[axis] = bounce->origin[axis];
+        ray->direction[axis] = bounce->direction[axis];
+    }
+    ray->t_min = bounce->t_min;
+    ray->t_max = view->povray_epsilon ? POVRAY_FARTHEST : INFINITY;
+    ray->shadow = false;
+    ray->width = bounce->width;
+    ray->spread = view->spread;
+}
+
+static void set_eye(const pl_view *view, pl_bounce *eye)
+{
+    *eye = (pl_bounce){.t_min = view->povray_epsilon ? nextafter(POVRAY_LEAST, 0.0) : 0.0,
+                       .share = {1.0, 1.0, 1.0},
+                       .weight = 1.0,
+                       .level = 1};
+    memcpy(eye->origin, view->camera.location, sizeof eye->origin);
+}
+
+static void look(pl_shader *shader, unsigned i, const double direction[3])
+{
+    memcpy(shader->eyes[i].direction, direction, sizeof shader->eyes[i].direction);
+    memcpy(shader->eye_rays[i].direction, direction, sizeof shader->eye_rays[i].direction);
+}
+
 pl_shader *pl_shader_create(const pl_view *view, pl_error *error)
 {
     pl_shader *shader = calloc(1, sizeof *shader);
@@ -92,9 +136,11 @@ pl_shader *pl_shader_create(const pl_view *view, pl_error *error)
         return NULL;
     }
     shader->view = view;
-    pl_hit_init(&shader->hit);
-    pl_hit_init(&shader->blocker);
-    for (int i = 0; i < PL_TRACE_MANY; i++) pl_hit_init(&shader->ahead_hits[i]);
+    for (int i = 0; i < PL_TRACE_MANY; i++) pl_hit_init(&shader->hits[i]);
+    for (int i = 0; i < PL_TRACE_MANY; i++) {
+        set_eye(view, &shader->eyes[i]);
+        set_ray(view, &shader->eyes[i], &shader->eye_rays[i]);
+    }
     shader->tracer = pl_tracer_create(view->scene, error);
     if (shader->tracer) return shader;
     pl_shader_destroy(shader);
@@ -105,9 +151,7 @@ void pl_shader_destroy(pl_shader *shader)
 {
     if (!shader) return;
     if (shader->tracer) pl_tracer_destroy(shader->tracer);
-    pl_hit_free(&shader->hit);
-    pl_hit_free(&shader->blocker);
-    for (int i = 0; i < PL_TRACE_MANY; i++) pl_hit_free(&shader->ahead_hits[i]);
+    for (int i = 0; i < PL_TRACE_MANY; i++) pl_hit_free(&shader->hits[i]);
     free(shader->waiting);
     free(shader);
 }
@@ -169,14 +213,13 @@ static bool cross(void *context, const pl_hit *hit)
     return false;
 }
 
-/* Filters the colour by all surfaces along the ray, in order. The nearest one is looked at first: where there is none,
- * or it is opaque, the others don't matter and needn't be found. */
-static bool filter_light(pl_shader *shader, const pl_ray *ray, double color[3], pl_error *error)
+/* Filters the colour by all surfaces along the ray, in order. Where the nearest one, which is known, is opaque, the
+ * others don't matter and needn't be found. */
+static bool filter_light(pl_shader *shader, const pl_ray *ray, const pl_hit *nearest, double color[3], pl_error *error)
 {
     double through[3];
-    if (!pl_trace_nearest(shader->tracer, ray, &shader->blocker, error)) return false;
-    if (shader->blocker.t == INFINITY) return true;
-    if (!passes(shader, ray, &shader->blocker, through, error)) return false;
+    if (nearest->t == INFINITY) return true;
+    if (!passes(shader, ray, nearest, through, error)) return false;
     if (through[0] == 0.0 && through[1] == 0.0 && through[2] == 0.0) {
         memset(color, 0, 3 * sizeof *color);
         return true;
@@ -185,68 +228,130 @@ static bool filter_light(pl_shader *shader, const pl_ray *ray, double color[3], 
     return pl_trace_all(shader->tracer, ray, cross, &state, error) && !state.failed;
 }
 
-/* Makes the arriving colour what is left of it behind everything between the point and the light. */
-static bool shadow_light(pl_shader *shader, const pl_spotted *at, const double towards[3], double distance,
-                         double color[3], pl_error *error)
+/* The ray from a hit to the light; false: there is nothing in between. */
+static bool set_shadow_ray(const pl_shader *shader, const pl_shine *shine, pl_ray *ray)
 {
     const pl_view *view = shader->view;
-    pl_ray ray = {.shadow = true, .width = at->width, .spread = view->spread};
-    leave(shader, at, towards, ray.origin);
-    memcpy(ray.direction, towards, sizeof ray.direction);
-    ray.t_min = view->povray_epsilon ? POVRAY_SHADOW : 0.0;
-    ray.t_max = view->povray_epsilon ? fmin(distance - POVRAY_SHADOW, POVRAY_FARTHEST) : distance - at->epsilon;
-    if (!(ray.t_min < ray.t_max)) return true;
-    shader->rays.shadow++;
-    if (view->all_opaque) {
-        const int found = pl_trace_any(shader->tracer, &ray, error);
-        if (found > 0) memset(color, 0, 3 * sizeof *color);
-        return found >= 0;
+    const pl_spotted *at = shine->at;
+    leave(shader, at, shine->towards, ray->origin);
+    memcpy(ray->direction, shine->towards, sizeof ray->direction);
+    ray->t_min = view->povray_epsilon ? POVRAY_SHADOW : 0.0;
+    ray->t_max = view->povray_epsilon ? fmin(shine->distance - POVRAY_SHADOW, POVRAY_FARTHEST) : shine->distance - at->epsilon;
+    ray->shadow = true;
+    ray->width = at->width;
+    ray->spread = view->spread;
+    return ray->t_min < ray->t_max;
+}
+
+/* Makes the colours that arrive what is left of them behind everything on the first `count` rays to the light. */
+static bool shadow_light(pl_shader *shader, pl_shine *const *shines, unsigned count, pl_error *error)
+{
+    shader->rays.shadow += count;
+    if (shader->view->all_opaque) {
+        if (pl_trace_any_many(shader->tracer, shader->traced, count, shader->blocked, error) < count) return false;
+        for (unsigned i = 0; i < count; i++)
+            if (shader->blocked[i]) memset(shines[i]->color, 0, sizeof shines[i]->color);
+        return true;
     }
-    return filter_light(shader, &ray, color, error);
+    if (pl_trace_nearest_many(shader->tracer, shader->traced, count, shader->hits, error) < count) return false;
+    for (unsigned i = 0; i < count; i++)
+        if (!filter_light(shader, &shader->traced[i], &shader->hits[i], shines[i]->color, error)) return false;
+    return true;
 }
 
 /* --- light on a surface (section 2) --- */
 
-/* The highlights' share of a light; the same for all channels. */
-static double highlights(const pl_finish *finish, const double normal[3], const double direction[3],
-                         const double towards[3])
+/* Of the angle between the light and the mirrored ray; 0: no highlight. */
+static double phong_cosine(const pl_shine *shine)
 {
-    double sum = 0.0;
-    if (finish->phong != 0.0) {
-        const double along = pl_dot(direction, normal);
-        double mirrored[3];
-        for (int axis = 0; axis < 3; axis++) mirrored[axis] = direction[axis] - 2.0 * along * normal[axis];
-        const double cosine = pl_dot(mirrored, towards);
-        /* POV-Ray saves itself the faint end of sharp highlights. */
-        if (cosine > 0.0 && (finish->phong_size < 60.0 || cosine > 0.0008))
-            sum += finish->phong * pl_pow(fmin(cosine, 1.0), finish->phong_size);
-    }
-    if (finish->specular != 0.0) {
-        double half[3];
-        for (int axis = 0; axis < 3; axis++) half[axis] = towards[axis] - direction[axis];
-        pl_normalize(half);
-        const double cosine = pl_dot(half, normal);
-        if (cosine > 0.0) sum += finish->specular * pl_pow(fmin(cosine, 1.0), 1.0 / finish->roughness);
-    }
+    const pl_spotted *at = shine->at;
+    const double *direction = at->ray->direction;
+    if (at->finish.phong == 0.0) return 0.0;
+    const double along = pl_dot(direction, at->normal);
+    double mirrored[3];
+    for (int axis = 0; axis < 3; axis++) mirrored[axis] = direction[axis] - 2.0 * along * at->normal[axis];
+    const double cosine = pl_dot(mirrored, shine->towards);
+    /* POV-Ray saves itself the faint end of sharp highlights. */
+    return cosine > 0.0 && (at->finish.phong_size < 60.0 || cosine > 0.0008) ? fmin(cosine, 1.0) : 0.0;
+}
+
+/* Of the angle between the normal and half the way from the eye to the light; 0: no highlight. */
+static double specular_cosine(const pl_shine *shine)
+{
+    const pl_spotted *at = shine->at;
+    if (at->finish.specular == 0.0) return 0.0;
+    double half[3];
+    for (int axis = 0; axis < 3; axis++) half[axis] = shine->towards[axis] - at->ray->direction[axis];
+    pl_normalize(half);
+    const double cosine = pl_dot(half, at->normal);
+    return cosine > 0.0 ? fmin(cosine, 1.0) : 0.0;
+}
+
+/* No less than cosine^size for 0 <= cosine <= 1: the power of the whole part, by squaring. */
+static double power_bound(double cosine, double size)
+{
+    double power = 1.0;
+    if (!(size >= 0.0)) return INFINITY;
+    for (unsigned n = size < 1023.0 ? (unsigned)size : 1023; n; n >>= 1, cosine *= cosine)
+        if (n & 1) power *= cosine;
+    return power * (1.0 + 0x1p-30) + 0x1p-1000;
+}
+
+/* The highlights' share of a light, the same for all channels: 0 where it is so faint that adding it to the shine's share
+ * changes no bit. Powers cost more than all other shading. */
+static double highlights(const pl_shine *shine)
+{
+    const pl_finish *finish = &shine->at->finish;
+    const double phong = phong_cosine(shine), specular = specular_cosine(shine);
+    double most = 0.0, sum = 0.0;
+    if (phong > 0.0) most += fabs(finish->phong) * power_bound(phong, finish->phong_size);
+    if (specular > 0.0) most += fabs(finish->specular) * power_bound(specular, 1.0 / finish->roughness);
+    bool shows = false;
+    for (int c = 0; c < 3; c++)
+        shows = shows || shine->share[c] + most != shine->share[c] || shine->share[c] - most != shine->share[c];
+    if (!shows) return 0.0;
+    if (phong > 0.0) sum += finish->phong * pl_pow(phong, finish->phong_size);
+    if (specular > 0.0) sum += finish->specular * pl_pow(specular, 1.0 / finish->roughness);
     return sum;
 }
 
-/* Adds what one light does. Shadows are traced last, and only where they can matter. */
-static bool add_light(pl_shader *shader, const pl_light *light, const pl_spotted *at, double total[3],
-                      pl_error *error)
+/* Whether a light can matter on a hit, and what of it would arrive without shadows. */
+static bool shines_on(const pl_light *light, pl_shine *shine)
 {
-    const pl_finish *finish = &at->finish;
-    double towards[3], distance, color[3], share[3];
-    pl_light_direction(light, at->point, towards, &distance);
-    const double cosine = pl_dot(at->normal, towards);
-    if (!(cosine >= LEAST_COSINE) || !pl_light_arriving(light, towards, distance, color)) return true;
+    const pl_spotted *at = shine->at;
     const double opacity = 1.0 - at->pigment.filter - at->pigment.transmit;
-    const double fall = finish->brilliance == 1.0 ? cosine : pl_pow(cosine, finish->brilliance);
-    const double glint = light->shadowless ? 0.0 : highlights(finish, at->normal, at->ray->direction, towards);
-    for (int c = 0; c < 3; c++) share[c] = at->pigment.color[c] * opacity * (finish->diffuse * fall) + glint;
-    if (share[0] == 0.0 && share[1] == 0.0 && share[2] == 0.0) return true;
-    if (!light->shadowless && !shadow_light(shader, at, towards, distance, color, error)) return false;
-    for (int c = 0; c < 3; c++) total[c] += color[c] * share[c];
+    pl_light_direction(light, at->point, shine->towards, &shine->distance);
+    const double cosine = pl_dot(at->normal, shine->towards);
+    if (!(cosine >= LEAST_COSINE) || !pl_light_arriving(light, shine->towards, shine->distance, shine->color))
+        return false;
+    const double fall = at->finish.brilliance == 1.0 ? cosine : pl_pow(cosine, at->finish.brilliance);
+    for (int c = 0; c < 3; c++) shine->share[c] = at->pigment.color[c] * opacity * (at->finish.diffuse * fall);
+    if (shine->share[0] != 0.0 || shine->share[1] != 0.0 || shine->share[2] != 0.0) return true;
+    return !light->shadowless && highlights(shine) != 0.0;
+}
+
+/* Adds what arrives. Highlights wait until it is known that something does. */
+static void add_shine(const pl_light *light, const pl_shine *shine)
+{
+    if (pl_is_dark(shine->color)) return;
+    const double glint = light->shadowless ? 0.0 : highlights(shine);
+    for (int c = 0; c < 3; c++) shine->at->total[c] += shine->color[c] * (shine->share[c] + glint);
+}
+
+/* Adds what one light does on some hits. Shadows are traced last, and only where they can matter. */
+static bool add_light(pl_shader *shader, const pl_light *light, pl_spotted *spotted, unsigned count, pl_error *error)
+{
+    pl_shine *shadowed[PL_TRACE_MANY];
+    unsigned shining = 0, rays = 0;
+    for (unsigned i = 0; i < count; i++) {
+        pl_shine *shine = &shader->shines[shining];
+        shine->at = &spotted[i];
+        if (!spotted[i].found || !shines_on(light, shine)) continue;
+        shining++;
+        if (!light->shadowless && set_shadow_ray(shader, shine, &shader->traced[rays])) shadowed[rays++] = shine;
+    }
+    if (rays && !shadow_light(shader, shadowed, rays, error)) return false;
+    for (unsigned i = 0; i < shining; i++) add_shine(light, &shader->shines[i]);
     return true;
 }
 
@@ -320,20 +425,6 @@ static bool follow_both(pl_shader *shader, const pl_spotted *at, pl_error *error
 
 /* --- a sample --- */
 
-/* Written in place: a structure that is put together and then copied waits for its parts to reach the cache. */
-static void set_ray(const pl_shader *shader, const pl_bounce *bounce, pl_ray *ray)
-{
-    for (int axis = 0; axis < 3; axis++) {
-        ray->origin[axis] = bounce->origin[axis];
-        ray->direction[axis] = bounce->direction[axis];
-    }
-    ray->t_min = bounce->t_min;
-    ray->t_max = shader->view->povray_epsilon ? POVRAY_FARTHEST : INFINITY;
-    ray->shadow = false;
-    ray->width = bounce->width;
-    ray->spread = shader->view->spread;
-}
-
 /* What the surface needs for shading: everything that the tracer's next call may overwrite is copied. */
 static bool spot(const pl_bounce *bounce, const pl_ray *ray, double t, const pl_surface *surface, pl_spotted *at,
                  pl_error *error)
@@ -341,7 +432,7 @@ static bool spot(const pl_bounce *bounce, const pl_ray *ray, double t, const pl_
     at->ray = bounce;
     at->epsilon = pl_hit_epsilon(surface, ray, t);
     at->width = ray->width + ray->spread * t;
-    at->finish = pl_texture_finish(surface->texture);
+    pl_texture_finish(surface->texture, &at->finish);
     memcpy(at->point, surface->point, sizeof at->point);
     memcpy(at->normal, surface->normal, sizeof at->normal);
     memcpy(at->flat, surface->flat, sizeof at->flat);
@@ -350,120 +441,116 @@ static bool spot(const pl_bounce *bounce, const pl_ray *ray, double t, const pl_
     return pl_texture_pigment(surface->texture, surface->entries, surface->pattern_point, &at->pigment, error);
 }
 
-/* The light of a hit itself, added to color; rays that go on are left waiting. */
-static bool shade_hit(pl_shader *shader, const pl_spotted *at, double color[3], pl_error *error)
-{
-    const pl_view *view = shader->view;
-    const double opacity = 1.0 - at->pigment.filter - at->pigment.transmit;
-    double total[3];
-    for (int c = 0; c < 3; c++)
-        total[c] = at->pigment.color[c] * opacity *
-                   (at->finish.ambient[c] * view->ambient_light[c] + at->finish.emission[c]);
-    for (uint32_t i = 0; i < view->light_count; i++)
-        if (!add_light(shader, &view->lights[i], at, total, error)) return false;
-    for (int c = 0; c < 3; c++) color[c] += at->ray->share[c] * total[c];
-    return follow_both(shader, at, error);
-}
-
-/* Whether the hit of an eye's ray is known; then it becomes the shader's. */
-static bool take_ahead(pl_shader *shader, const pl_ray *ray)
-{
-    const unsigned i = shader->ahead_next;
-    if (i >= shader->ahead_count || memcmp(shader->ahead[i].direction, ray->direction, sizeof ray->direction) != 0)
-        return false;
-    const pl_hit hit = shader->ahead_hits[i];
-    shader->ahead_hits[i] = shader->hit;
-    shader->hit = hit;
-    shader->ahead_next++;
-    return true;
-}
-
-static bool find(pl_shader *shader, const pl_ray *ray, bool is_eye, pl_surface *surface, pl_error *error)
-{
-    if (!(is_eye && take_ahead(shader, ray)) && !pl_trace_nearest(shader->tracer, ray, &shader->hit, error)) return false;
-    return shader->hit.t == INFINITY || pl_trace_surface(shader->tracer, ray, &shader->hit, surface, error);
-}
-
-/* As find, for the eye's ray; fills *first where asked. */
-static bool find_first(pl_shader *shader, const pl_ray *ray, pl_surface *surface, pl_first *first, pl_error *error)
+static void begin_first(const pl_shader *shader, pl_first *first)
 {
     pl_counters *counters = pl_tracer_counters(shader->tracer);
-    const uint64_t box_tests = counters->box_tests;
+    first->box_tests = counters->box_tests;
     counters->miss_depth = 0;
-    shader->rays.primary++;
-    if (!find(shader, ray, true, surface, error)) return false;
-    if (!first) return true;
-    if (!pl_trace_number(shader->tracer, &shader->hit, error)) return false;
-    first->t = shader->hit.t;
+}
+
+/* What the eye's ray met; surface where it met something. */
+static bool set_first(pl_shader *shader, pl_hit *hit, const pl_surface *surface, pl_first *first, pl_error *error)
+{
+    const pl_counters *counters = pl_tracer_counters(shader->tracer);
+    if (!pl_trace_number(shader->tracer, hit, error)) return false;
+    first->t = hit->t;
     if (first->t != INFINITY) {
-        first->primitive = pl_trace_primitive(shader->tracer, &shader->hit);
+        first->primitive = pl_trace_primitive(shader->tracer, hit);
         first->surface = *surface;
     }
-    first->box_tests = counters->box_tests - box_tests;
+    first->box_tests = counters->box_tests - first->box_tests;
     first->miss_depth = counters->miss_depth;
     return true;
 }
 
-static void set_eye_ray(const pl_shader *shader, const double direction[3], pl_bounce *eye)
+/* The light of hits themselves, into their totals. */
+static bool light_hits(pl_shader *shader, pl_spotted *spotted, unsigned count, pl_error *error)
 {
-    for (int axis = 0; axis < 3; axis++) {
-        eye->origin[axis] = shader->view->camera.location[axis];
-        eye->direction[axis] = direction[axis];
-        eye->share[axis] = 1.0;
+    const pl_view *view = shader->view;
+    for (unsigned i = 0; i < count; i++) {
+        pl_spotted *at = &spotted[i];
+        if (!at->found) continue;
+        const double opacity = 1.0 - at->pigment.filter - at->pigment.transmit;
+        for (int c = 0; c < 3; c++)
+            at->total[c] = at->pigment.color[c] * opacity *
+                           (at->finish.ambient[c] * view->ambient_light[c] + at->finish.emission[c]);
     }
-    eye->t_min = shader->view->povray_epsilon ? nextafter(POVRAY_LEAST, 0.0) : 0.0;
-    eye->width = 0.0;
-    eye->weight = 1.0;
-    eye->level = 0;
+    for (uint32_t i = 0; i < view->light_count; i++)
+        if (!add_light(shader, &view->lights[i], spotted, count, error)) return false;
+    return true;
 }
 
-void pl_shade_ahead(pl_shader *shader, const double (*directions)[3], unsigned count)
+/* Finds what some bounces' rays meet, and lights it. */
+static bool spot_all(pl_shader *shader, const pl_bounce *bounces, const pl_ray *rays, unsigned count, pl_spotted *spotted,
+                     pl_first *first, pl_error *error)
 {
-    pl_error error; /* comes again when the ray is asked for */
-    shader->ahead_count = shader->ahead_next = 0;
-    if (!pl_trace_has_packets(shader->tracer)) return;
+    unsigned found = 0;
+    if (pl_trace_nearest_many(shader->tracer, rays, count, shader->hits, error) < count) return false;
     for (unsigned i = 0; i < count; i++) {
-        pl_bounce eye;
-        set_eye_ray(shader, directions[i], &eye);
-        set_ray(shader, &eye, &shader->ahead[i]);
+        const pl_ray *ray = &rays[i];
+        pl_hit *hit = &shader->hits[i];
+        pl_surface surface;
+        spotted[i].found = hit->t != INFINITY;
+        if (spotted[i].found && !(pl_trace_surface(shader->tracer, ray, hit, &surface, error) &&
+                                  spot(&bounces[i], ray, hit->t, &surface, &spotted[i], error)))
+            return false;
+        found += spotted[i].found;
+        if (first && !set_first(shader, hit, &surface, first, error)) return false;
     }
-    shader->ahead_count = pl_trace_nearest_many(shader->tracer, shader->ahead, count, shader->ahead_hits, &error);
+    return found == 0 || light_hits(shader, spotted, count, error);
+}
+
+/* Adds a lighted hit to the sample's colour; rays that go on are left waiting. */
+static bool collect(pl_shader *shader, const pl_bounce *bounce, const pl_spotted *at, double color[3], pl_error *error)
+{
+    const double *own = at->found ? at->total : shader->view->background;
+    for (int c = 0; c < 3; c++) color[c] += bounce->share[c] * own[c];
+    return !at->found || follow_both(shader, at, error);
+}
+
+/* What remains of a sample: the rays that wait, and those that come of them, the last one first. */
+static bool follow_all(pl_shader *shader, double color[3], pl_error *error)
+{
+    while (shader->count) {
+        const pl_bounce bounce = shader->waiting[--shader->count];
+        pl_ray ray;
+        pl_spotted at;
+        set_ray(shader->view, &bounce, &ray);
+        if (!spot_all(shader, &bounce, &ray, 1, &at, NULL, error) || !collect(shader, &bounce, &at, color, error)) return false;
+    }
+    return true;
 }
 
 bool pl_shade_first(pl_shader *shader, const double direction[3], pl_first *first, pl_error *error)
 {
-    pl_bounce eye;
-    pl_ray ray;
     pl_surface surface;
-    set_eye_ray(shader, direction, &eye);
-    set_ray(shader, &eye, &ray);
-    return find_first(shader, &ray, &surface, first, error);
+    begin_first(shader, first);
+    shader->rays.primary++;
+    look(shader, 0, direction);
+    if (!pl_trace_nearest(shader->tracer, shader->eye_rays, shader->hits, error)) return false;
+    if (shader->hits->t != INFINITY &&
+        !pl_trace_surface(shader->tracer, shader->eye_rays, shader->hits, &surface, error))
+        return false;
+    return set_first(shader, shader->hits, &surface, first, error);
 }
 
-bool pl_shade(pl_shader *shader, const double direction[3], double color[3], pl_first *first, pl_error *error)
+bool pl_shade(pl_shader *shader, const double (*directions)[3], unsigned count, double (*colors)[3], pl_first *first,
+              pl_error *error)
 {
     const pl_view *view = shader->view;
-    pl_bounce bounce;
-    set_eye_ray(shader, direction, &bounce);
-    memset(color, 0, 3 * sizeof *color);
-    shader->count = 0;
-    shader->sample_rays = 0;
-    if (!(bounce.level < view->max_trace_level) || bounce.weight < view->adc_bailout)
-        return !first || pl_shade_first(shader, direction, first, error);
-    bounce.level = 1;
-    for (bool is_eye = true;; is_eye = false) {
-        pl_ray ray;
-        pl_surface surface;
-        set_ray(shader, &bounce, &ray);
-        pl_spotted at;
-        if (!(is_eye ? find_first(shader, &ray, &surface, first, error) : find(shader, &ray, false, &surface, error)))
+    memset(colors, 0, count * sizeof *colors);
+    if (!(0 < view->max_trace_level) || 1.0 < view->adc_bailout)
+        return !first || pl_shade_first(shader, *directions, first, error);
+    if (first) begin_first(shader, first);
+    shader->rays.primary += count;
+    for (unsigned i = 0; i < count; i++) look(shader, i, directions[i]);
+    if (!spot_all(shader, shader->eyes, shader->eye_rays, count, shader->spotted, first, error)) return false;
+    for (unsigned i = 0; i < count; i++) {
+        shader->count = 0;
+        shader->sample_rays = 0;
+        if (!collect(shader, &shader->eyes[i], &shader->spotted[i], colors[i], error) ||
+            !follow_all(shader, colors[i], error))
             return false;
-        if (shader->hit.t == INFINITY)
-            for (int c = 0; c < 3; c++) color[c] += bounce.share[c] * view->background[c];
-        else if (!spot(&bounce, &ray, shader->hit.t, &surface, &at, error) ||
-                 !shade_hit(shader, &at, color, error))
-            return false;
-        if (shader->count == 0) return true;
-        bounce = shader->waiting[--shader->count];
     }
+    return true;
 }

@@ -4,7 +4,7 @@
  *     if (!pl_view_create(&view, scene, error)) …
  *     pl_shader *shader = pl_shader_create(&view, error);         one a thread
  *     pl_camera_direction(&view.camera, x + 0.5, y + 0.5, width, height, direction);
- *     if (!pl_shade(shader, direction, color, NULL, error)) …     linear rgb, never clipped
+ *     if (!pl_shade(shader, &direction, 1, &color, NULL, error)) …     linear rgb, never clipped
  *
  * Nothing recurses and nothing is allocated a ray: reflected and transmitted rays wait on a stack that the shader owns.
  * A colour depends on the scene and the direction only. */
@@ -50,11 +50,10 @@ typedef struct pl_first {
     uint32_t miss_depth;
 } pl_first;
 
-/* The colour seen from the camera in a unit direction; first may be NULL. */
-bool pl_shade(pl_shader *shader, const double direction[3], double color[3], pl_first *first, pl_error *error);
-
-/* Traces the eye's rays in up to PL_TRACE_MANY directions that will be asked for next, in this order. It only saves time. */
-void pl_shade_ahead(pl_shader *shader, const double (*directions)[3], unsigned count);
+/* The colours seen from the camera in up to PL_TRACE_MANY unit directions, whose rays and shadows are traced together;
+ * first: of a single one, or NULL. */
+bool pl_shade(pl_shader *shader, const double (*directions)[3], unsigned count, double (*colors)[3], pl_first *first,
+              pl_error *error);
 
 /* The first hit alone. */
 bool pl_shade_first(pl_shader *shader, const double direction[3], pl_first *first, pl_error *error);

@@ -2,7 +2,8 @@
  *
  * Two ways to the same bits. A hit with a path is walked down once more, with all parameters. A hit with a trail knows
  * the items on its path, whose transformations and textures the states have kept; only textures with values computed
- * from parameters need the walk there too. */
+ * from parameters need the walk there too. A cut instance has the texture of the first primitive below it, which the
+ * first walk to each state finds. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +13,10 @@
 
 /* How far below a cut instance its first primitive is looked for. */
 enum { CUT_DEPTH = 64, CUT_STEPS = 4096 };
+
+/* What is known of the texture of the first primitive below a state; from FIRST_NODE on: its node, and it has neither
+ * pattern nor code. */
+enum { FIRST_UNKNOWN, FIRST_WALK, FIRST_NONE, FIRST_NODE };
 
 /* What is needed of a leaf. */
 typedef struct leaf_surface {
@@ -56,7 +61,7 @@ static bool take_texture(pl_tracer *tracer, double t, pl_surface *surface, pl_er
 
 /* A normal above a transformation: by the inverse transpose (paper, section 2: only the foremost hit's normal is
  * transformed back). Its length is kept in range, so that no scale however deep overflows. */
-static void map_normal_back(const pl_transform *transform, double n[3])
+static inline void map_normal_back(const pl_transform *transform, double n[3])
 {
     const double *m = transform->to_object.m;
     if (transform->form == PL_FORM_TRANSLATION) return;
@@ -68,6 +73,17 @@ static void map_normal_back(const pl_transform *transform, double n[3])
     for (int axis = 0; axis < 3; axis++) n[axis] /= size;
 }
 
+/* The same up all items; the copy stays in registers. */
+static void map_normal_up(const pl_items *items, double normal[3])
+{
+    double n[3] = {normal[0], normal[1], normal[2]};
+    for (size_t i = items->count; i-- > 0;) {
+        const pl_item *item = items->list[i];
+        for (uint32_t k = item->transform_count; k-- > 0;) map_normal_back(item->transforms[k], n);
+    }
+    memcpy(normal, n, sizeof n);
+}
+
 /* Sets the normals in the leaf's own frame. */
 static void begin_normals(leaf_surface *leaf, const pl_hit *hit, pl_surface *surface)
 {
@@ -75,12 +91,6 @@ static void begin_normals(leaf_surface *leaf, const pl_hit *hit, pl_surface *sur
     if (leaf->mesh) pl_mesh_normal(leaf->mesh, hit->part, hit->local, surface->normal);
     else leaf->shape->normal(leaf->arguments, hit->part, hit->local, surface->normal);
     if (leaf->smooth) pl_mesh_flat_normal(leaf->mesh, hit->part, surface->flat);
-}
-
-static void map_normals_back(const leaf_surface *leaf, const pl_transform *transform, pl_surface *surface)
-{
-    map_normal_back(transform, surface->normal);
-    if (leaf->smooth) map_normal_back(transform, surface->flat);
 }
 
 static void set_unit(double n[3])
@@ -113,11 +123,20 @@ static void begin_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hi
         surface->pattern_point[axis] = ray->origin[axis] + hit->t * ray->direction[axis];
 }
 
+/* What a texture node tells of all instances of a state. */
+static uint32_t told_by(const pl_program *program, uint32_t node)
+{
+    const pl_node *texture = &program->nodes[node];
+    const bool solid = program->records[texture->as.texture.texture].values[PL_TEXTURE_PATTERN] == PL_PATTERN_SOLID;
+    return texture->as.texture.code || !solid ? FIRST_WALK : FIRST_NODE + node;
+}
+
 /* The texture of the first primitive below a cut instance, where there is one within reach: an endless recursion may have
- * none at all. The walk stands at the instance. */
-static bool take_first_texture(pl_tracer *tracer, double t, pl_surface *surface, pl_error *error)
+ * none at all. The walk stands at the instance. Sets *told, which may be FIRST_WALK for good. */
+static bool take_first_texture(pl_tracer *tracer, double t, pl_surface *surface, uint32_t *told, pl_error *error)
 {
     pl_walk *walk = &tracer->walk;
+    uint32_t first = FIRST_NONE;
     const double *texture = surface->texture;
     const uint32_t entries = surface->entries, deepest = walk->at.depth + CUT_DEPTH;
     double point[3], *o = walk->at.payload;
@@ -127,10 +146,11 @@ static bool take_first_texture(pl_tracer *tracer, double t, pl_surface *surface,
         switch (pl_walk_next(walk, error)) {
         case PL_EVENT_ERROR: return false;
         case PL_EVENT_PRIMITIVE:
-        case PL_EVENT_MESH: return true;
+        case PL_EVENT_MESH: *told = first; return true;
         case PL_EVENT_TRANSFORM: pl_map_ray(walk->transform, o, o + 3); break;
         case PL_EVENT_TEXTURE:
             if (!take_texture(tracer, t, surface, error)) return false;
+            if (first != FIRST_WALK) first = told_by(walk->program, walk->node);
             break;
         case PL_EVENT_END: steps = CUT_STEPS; break;
         default: break;
@@ -139,24 +159,33 @@ static bool take_first_texture(pl_tracer *tracer, double t, pl_surface *surface,
     surface->texture = texture;
     surface->entries = entries;
     memcpy(surface->pattern_point, point, sizeof point);
+    *told = first == FIRST_WALK ? FIRST_WALK : FIRST_NONE;
     return true;
 }
 
-/* A cut instance: its box has no sides, so the normal is turned against the ray. The walk stands at its enter node. */
-static bool finish_cut(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface, pl_error *error)
+/* A cut instance's box has no sides, so the normal is turned against the ray. symbol: its node. */
+static void set_cut(const pl_scene *scene, const pl_ray *ray, const pl_hit *hit, uint32_t symbol, int32_t rule,
+                    pl_surface *surface)
 {
-    const pl_program *program = tracer->scene->program;
-    const uint32_t symbol = program->nodes[tracer->walk.node].as.enter.symbol;
     double length = 0.0;
     for (int axis = 0; axis < 3; axis++) length += ray->direction[axis] * ray->direction[axis];
     for (int axis = 0; axis < 3; axis++) {
         surface->flat[axis] = surface->normal[axis] = -ray->direction[axis] / sqrt(length);
         surface->point[axis] = ray->origin[axis] + hit->t * ray->direction[axis];
     }
-    surface->symbol = (int32_t)program->nodes[symbol].symbol;
-    surface->rule = tracer->walk.at.rule;
+    surface->symbol = (int32_t)scene->program->nodes[symbol].symbol;
+    surface->rule = rule;
     surface->depth = (int32_t)hit->cut_depth;
-    return take_first_texture(tracer, hit->t, surface, error);
+}
+
+/* Where a cut instance's state keeps what was found below it. NULL: no memory. */
+static uint32_t *place_of_told(pl_tracer *tracer, pl_error *error)
+{
+    const pl_items *items = &tracer->items;
+    if (!tracer->first_textures)
+        tracer->first_textures = calloc(tracer->scene->states.count, sizeof *tracer->first_textures);
+    if (!tracer->first_textures) pl_fail_memory(error, "shading a hit");
+    return tracer->first_textures ? &tracer->first_textures[items->list[items->count - 1]->what] : NULL;
 }
 
 /* By the path: the derivation once more, or as much of it as the accelerator can't skip. */
@@ -172,6 +201,7 @@ static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit
     memcpy(o, ray->origin, 3 * sizeof *o);
     memcpy(d, ray->direction, 3 * sizeof *d);
     leaf_surface leaf = {0};
+    uint32_t unused, *told = &unused;
     for (bool found = false; !found;) {
         switch (pl_walk_next(walk, error)) {
         case PL_EVENT_ERROR: return false;
@@ -184,8 +214,11 @@ static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit
             if (!take_texture(tracer, hit->t, surface, error)) return false;
             break;
         case PL_EVENT_ENTER:
-            if (hit->cut_depth && walk->at.terms == path->length && walk->at.depth + 1 == hit->cut_depth)
-                return finish_cut(tracer, ray, hit, surface, error);
+            if (hit->cut_depth && walk->at.terms == path->length && walk->at.depth + 1 == hit->cut_depth) {
+                if (accel->items && !(told = place_of_told(tracer, error))) return false;
+                set_cut(tracer->scene, ray, hit, walk->program->nodes[walk->node].as.enter.symbol, walk->at.rule, surface);
+                return take_first_texture(tracer, hit->t, surface, told, error);
+            }
             if (skips) accel->skip(tracer->scene, &hit->trail, walk);
             break;
         case PL_EVENT_PRIMITIVE:
@@ -204,7 +237,10 @@ static bool walk_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit
     leaf.rule = walk->at.rule;
     leaf.depth = walk->at.depth;
     begin_normals(&leaf, hit, surface);
-    for (size_t i = tracer->chain.count; i-- > 0;) map_normals_back(&leaf, &tracer->chain.list[i], surface);
+    for (size_t i = tracer->chain.count; i-- > 0;) {
+        map_normal_back(&tracer->chain.list[i], surface->normal);
+        if (leaf.smooth) map_normal_back(&tracer->chain.list[i], surface->flat);
+    }
     finish_surface(tracer->scene, &leaf, ray, hit, surface);
     return true;
 }
@@ -221,13 +257,16 @@ static int64_t innermost_texture(const pl_items *items, bool *code)
     return innermost;
 }
 
-/* The texture of item `textured`, and the hit point in the frame where it stands. */
+/* The texture of item `textured`, and where it has a pattern the hit point in the frame where it stands. */
 static void take_items_texture(const pl_scene *scene, const pl_ray *ray, const pl_hit *hit, const pl_items *items,
                                size_t textured, pl_surface *surface)
 {
     const pl_node *node = &scene->program->nodes[items->list[textured]->texture];
     const pl_record *record = &scene->program->records[node->as.texture.texture];
     double o[3], d[3];
+    surface->texture = record->values;
+    surface->entries = record->entries;
+    if (record->values[PL_TEXTURE_PATTERN] == PL_PATTERN_SOLID) return;
     memcpy(o, ray->origin, sizeof o);
     memcpy(d, ray->direction, sizeof d);
     for (size_t i = 0; i <= textured; i++) {
@@ -236,8 +275,6 @@ static void take_items_texture(const pl_scene *scene, const pl_ray *ray, const p
         for (uint32_t k = 0; k < count; k++) pl_map_ray(item->transforms[k], o, d);
     }
     for (int axis = 0; axis < 3; axis++) surface->pattern_point[axis] = o[axis] + hit->t * d[axis];
-    surface->texture = record->values;
-    surface->entries = record->entries;
 }
 
 /* By the items on the path. */
@@ -251,9 +288,10 @@ static void items_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hi
     else leaf.shape = pl_shape_of(last->what);
     begin_surface(tracer, ray, hit, surface);
     begin_normals(&leaf, hit, surface);
+    map_normal_up(items, surface->normal);
+    if (leaf.smooth) map_normal_up(items, surface->flat);
     for (size_t i = items->count; i-- > 0;) {
         const pl_item *item = items->list[i];
-        for (uint32_t k = item->transform_count; k-- > 0;) map_normals_back(&leaf, item->transforms[k], surface);
         if (leaf.rule < 0) leaf.rule = item->rule;
         if (item->kind != PL_NODE_ENTER) continue;
         if (leaf.depth++ == 0) leaf.symbol = scene->states.list[item->what].symbol;
@@ -262,9 +300,29 @@ static void items_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hi
     finish_surface(scene, &leaf, ray, hit, surface);
 }
 
+/* A cut instance by the items on its path, `told` of its state. */
+static void items_cut(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, const pl_items *items, int64_t textured,
+                      uint32_t told, pl_surface *surface)
+{
+    const pl_scene *scene = tracer->scene;
+    const pl_program *program = scene->program;
+    int32_t rule = -1;
+    for (size_t i = items->count; i-- > 0 && rule < 0;) rule = items->list[i]->rule;
+    begin_surface(tracer, ray, hit, surface);
+    set_cut(scene, ray, hit, scene->states.list[items->list[items->count - 1]->what].symbol, rule, surface);
+    if (told >= FIRST_NODE) {
+        const pl_record *record = &program->records[program->nodes[told - FIRST_NODE].as.texture.texture];
+        surface->texture = record->values;
+        surface->entries = record->entries;
+    } else if (textured >= 0) {
+        take_items_texture(scene, ray, hit, items, (size_t)textured, surface);
+    }
+}
+
 bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface, pl_error *error)
 {
     const pl_accel *accel = tracer->scene->accel;
+    const uint32_t *told;
     bool code;
     if (!accel->items) return walk_surface(tracer, ray, hit, &hit->path, false, surface, error);
     if (!accel->items(tracer->scene, &hit->trail, &tracer->items)) return pl_fail_memory(error, "shading a hit");
@@ -274,9 +332,14 @@ bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, p
         return (accel->skip && walk_surface(tracer, ray, hit, &tracer->scratch, true, surface, &ignored)) ||
                walk_surface(tracer, ray, hit, &tracer->scratch, false, surface, error);
     }
-    int64_t textured = innermost_texture(&tracer->items, &code);
+    const int64_t textured = innermost_texture(&tracer->items, &code);
     if (!code && !hit->cut_depth) {
         items_surface(tracer, ray, hit, &tracer->items, textured, surface);
+        return true;
+    }
+    if (hit->cut_depth && !(told = place_of_told(tracer, error))) return false;
+    if (!code && (*told == FIRST_NONE || *told >= FIRST_NODE)) {
+        items_cut(tracer, ray, hit, &tracer->items, textured, *told, surface);
         return true;
     }
     if (!pl_items_path(&tracer->items, &tracer->scratch)) return pl_fail_memory(error, "shading a hit");

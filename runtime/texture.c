@@ -115,18 +115,15 @@ bool pl_texture_pigment(const double *texture, uint32_t entries, const double po
     return true;
 }
 
-pl_finish pl_texture_finish(const double *texture)
+void pl_texture_finish(const double *texture, pl_finish *finish)
 {
-    pl_finish finish = {
-        .diffuse = texture[PL_TEXTURE_DIFFUSE],
-        .brilliance = texture[PL_TEXTURE_BRILLIANCE],
-        .phong = texture[PL_TEXTURE_PHONG],
-        .phong_size = texture[PL_TEXTURE_PHONG_SIZE],
-        .specular = texture[PL_TEXTURE_SPECULAR],
-        .roughness = texture[PL_TEXTURE_ROUGHNESS],
-    };
-    memcpy(finish.ambient, texture + PL_TEXTURE_AMBIENT, sizeof finish.ambient);
-    memcpy(finish.emission, texture + PL_TEXTURE_EMISSION, sizeof finish.emission);
-    memcpy(finish.reflection, texture + PL_TEXTURE_REFLECTION, sizeof finish.reflection);
-    return finish;
+    finish->diffuse = texture[PL_TEXTURE_DIFFUSE];
+    finish->brilliance = texture[PL_TEXTURE_BRILLIANCE];
+    finish->phong = texture[PL_TEXTURE_PHONG];
+    finish->phong_size = texture[PL_TEXTURE_PHONG_SIZE];
+    finish->specular = texture[PL_TEXTURE_SPECULAR];
+    finish->roughness = texture[PL_TEXTURE_ROUGHNESS];
+    memcpy(finish->ambient, texture + PL_TEXTURE_AMBIENT, sizeof finish->ambient);
+    memcpy(finish->emission, texture + PL_TEXTURE_EMISSION, sizeof finish->emission);
+    memcpy(finish->reflection, texture + PL_TEXTURE_REFLECTION, sizeof finish->reflection);
 }

@@ -2,7 +2,7 @@
  *
  *     pl_pigment pigment;
  *     pl_texture_pigment(surface.texture, surface.entries, surface.pattern_point, &pigment, error);
- *     pl_finish finish = pl_texture_finish(surface.texture);
+ *     pl_texture_finish(surface.texture, &finish);
  *
  * A texture is a record's numbers (bytecode.h: PL_TEXTURE_…) with its entries behind them. */
 #ifndef PL_TEXTURE_H
@@ -25,7 +25,7 @@ typedef struct pl_finish {
 bool pl_texture_pigment(const double *texture, uint32_t entries, const double point[3], pl_pigment *pigment,
                         pl_error *error);
 
-pl_finish pl_texture_finish(const double *texture);
+void pl_texture_finish(const double *texture, pl_finish *finish);
 
 /* What passes through a surface of this colour, per channel: color * filter + transmit. */
 static inline void pl_pigment_through(const pl_pigment *pigment, double through[3])

@@ -39,6 +39,7 @@ void pl_tracer_destroy(pl_tracer *tracer)
     pl_hit_list_free(tracer->list);
     free(tracer->chain.list);
     free(tracer->texture);
+    free(tracer->first_textures);
     free(tracer->scratch.terms);
     free(tracer->spare.terms);
     free(tracer->items.list);
@@ -117,28 +118,26 @@ bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_erro
     return true;
 }
 
-static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_hit *hits)
+/* false: rays that don't go well together, or one of them has an error: alone they tell which. hits: of the nearest. */
+static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_query_kind kind, pl_hit *hits,
+                         pl_query *queries)
 {
     const pl_accel *accel = tracer->scene->accel;
-    pl_query queries[PL_TRACE_MANY];
-    pl_error error; /* is that of one of the rays: alone they tell which */
+    pl_error error;
     if (!accel->is_packet || !accel->is_packet(tracer, rays, count)) return false;
     for (unsigned i = 0; i < count; i++) {
-        begin_query(&queries[i], tracer, &rays[i], PL_QUERY_NEAREST, &error);
+        begin_query(&queries[i], tracer, &rays[i], kind, &error);
+        if (!hits) continue;
         queries[i].hit = &hits[i];
         begin_hit(&hits[i]);
     }
     return accel->trace_packet(tracer, rays, queries, count);
 }
 
-bool pl_trace_has_packets(const pl_tracer *tracer)
-{
-    return tracer->scene->accel->is_packet != NULL;
-}
-
 unsigned pl_trace_nearest_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_hit *hits, pl_error *error)
 {
-    if (trace_packet(tracer, rays, count, hits)) return count;
+    pl_query queries[PL_TRACE_MANY];
+    if (trace_packet(tracer, rays, count, PL_QUERY_NEAREST, hits, queries)) return count;
     for (unsigned i = 0; i < count; i++)
         if (!pl_trace_nearest(tracer, &rays[i], &hits[i], error)) return i;
     return count;
@@ -158,6 +157,21 @@ int pl_trace_any(pl_tracer *tracer, const pl_ray *ray, pl_error *error)
     begin_query(&query, tracer, ray, PL_QUERY_ANY, error);
     if (!tracer->scene->accel->trace(tracer, ray, &query)) return -1;
     return query.found;
+}
+
+unsigned pl_trace_any_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, bool *blocked, pl_error *error)
+{
+    pl_query queries[PL_TRACE_MANY];
+    if (trace_packet(tracer, rays, count, PL_QUERY_ANY, NULL, queries)) {
+        for (unsigned i = 0; i < count; i++) blocked[i] = queries[i].found;
+        return count;
+    }
+    for (unsigned i = 0; i < count; i++) {
+        const int found = pl_trace_any(tracer, &rays[i], error);
+        if (found < 0) return i;
+        blocked[i] = found;
+    }
+    return count;
 }
 
 bool pl_trace_all(pl_tracer *tracer, const pl_ray *ray, bool (*visit)(void *context, const pl_hit *hit), void *context,

@@ -43,7 +43,8 @@ typedef struct pl_surface {
     double flat[3];          /* the same, but of the triangle itself where the mesh is smooth */
     const double *texture;   /* PL_TEXTURE_VALUES numbers, then entries; valid until the tracer's next surface call */
     uint32_t entries;
-    double pattern_point[3]; /* the hit point in the frame where the texture stands (before its own matrix) */
+    double pattern_point[3]; /* the hit point in the frame where the texture stands (before its own matrix), where that has a
+                                pattern */
     int32_t symbol, rule, depth;
 } pl_surface;
 
@@ -59,7 +60,6 @@ bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_erro
 /* The same for up to PL_TRACE_MANY rays, which are traced as a packet where they go about the same way: the same hits.
  * Returns how many were traced before an error: `count` without. */
 enum { PL_TRACE_MANY = 16 };
-bool pl_trace_has_packets(const pl_tracer *tracer);
 unsigned pl_trace_nearest_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_hit *hits, pl_error *error);
 
 /* Makes sure that a hit's primitive index is known: where states are unfolded on touch, tracing doesn't count. */
@@ -67,6 +67,9 @@ bool pl_trace_number(pl_tracer *tracer, pl_hit *hit, pl_error *error);
 
 /* Whether anything stands between t_min and t_max: -1 error, 0 no, 1 yes. */
 int pl_trace_any(pl_tracer *tracer, const pl_ray *ray, pl_error *error);
+
+/* The same of up to PL_TRACE_MANY rays, as pl_trace_nearest_many; blocked[i]: something stands there. */
+unsigned pl_trace_any_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, bool *blocked, pl_error *error);
 
 /* Calls visit with every hit between t_min and t_max, in (t, path) order, until it returns false; for the shadows of
  * transparent things. A solid gives each of its roots. false: an error. */

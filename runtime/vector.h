@@ -22,16 +22,18 @@ static inline void pl_cross(const double a[3], const double b[3], double out[3])
  * has no direction (zero, or not finite) stays as it is, and the result is 0. */
 static inline double pl_normalize(double v[3])
 {
-    double square = pl_dot(v, v), scale = 1.0;
-    if (!(square > 1e-250 && square < 1e250)) {
-        scale = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
-        if (!(scale > 0.0 && scale < INFINITY)) return 0.0;
-        const double scaled[3] = {v[0] / scale, v[1] / scale, v[2] / scale};
-        square = pl_dot(scaled, scaled);
-        if (!(square > 0.0 && square < INFINITY)) return 0.0;
+    const double square = pl_dot(v, v);
+    if (square > 1e-250 && square < 1e250) {
+        const double length = sqrt(square);
+        for (int axis = 0; axis < 3; axis++) v[axis] = v[axis] / length;
+        return length;
     }
-    const double length = sqrt(square);
-    for (int axis = 0; axis < 3; axis++) v[axis] = v[axis] / scale / length;
+    const double scale = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    if (!(scale > 0.0 && scale < INFINITY)) return 0.0;
+    const double scaled[3] = {v[0] / scale, v[1] / scale, v[2] / scale};
+    const double length = sqrt(pl_dot(scaled, scaled));
+    if (!(length > 0.0 && length < INFINITY)) return 0.0;
+    for (int axis = 0; axis < 3; axis++) v[axis] = scaled[axis] / length;
     return length * scale;
 }
 

@@ -122,8 +122,10 @@ static inline enum kernel_verdict filter(const pl_front_primitive *p, uint32_t k
     if (!shape_interval(kind, p->argument, o, d, margin, &i)) return MISS;
     if (i.enter > i.leave || i.enter > t_max || i.leave < 0.0f) return MISS;
     if (!any || !(kind == PL_SHAPE_CYLINDER || kind == PL_SHAPE_SPHERE || kind == PL_SHAPE_BOX)) return CANDIDATE;
-    /* Outside the wider shape at first and later inside the narrower one: in between it passes the surface. */
+    /* Outside the wider shape at first and later inside the narrower one: in between it passes the surface. Along its axis a
+     * cylinder's interval doesn't tell. */
     interval deep = {-1e30f, 1e30f};
+    if (kind == PL_SHAPE_CYLINDER && !(d[0] * d[0] + d[1] * d[1] > 1e-30f)) return CANDIDATE;
     if (!(i.enter > 0.0f && margin < 0.25f) || !shape_interval(kind, p->argument, o, d, -margin, &deep)) return CANDIDATE;
     return deep.enter < deep.leave && deep.enter < t_max * 0.9999f ? CERTAIN : CANDIDATE;
 }

@@ -103,9 +103,24 @@ static inline void shape_lanes(uint32_t kind, float argument, const wide o[3], c
     }
 }
 
-/* The rays of a packet's frame that can have a root in a primitive. */
-static inline unsigned filter_lanes(const pl_front_primitive *p, uint32_t kind, const pl_packet_frame *f, unsigned lanes)
+/* Those of eight rays that certainly pass a shape's surface before t_max, given their interval (filter in kernel.h). */
+static inline unsigned certain_lanes(uint32_t kind, const wide o[3], const wide d[3], float margin, const wide_interval *i,
+                                     wide t_max)
 {
+    if (!(kind == PL_SHAPE_CYLINDER || kind == PL_SHAPE_SPHERE || kind == PL_SHAPE_BOX) || !(margin < 0.25f)) return 0;
+    wide_interval deep = {wide_set(-1e30f), wide_set(1e30f)};
+    shape_lanes(kind, 0.0f, o, d, -margin, &deep);
+    wide sure = wide_and(_mm256_cmp_ps(i->enter, wide_set(0.0f), _CMP_GT_OQ), _mm256_cmp_ps(deep.enter, deep.leave, _CMP_LT_OQ));
+    sure = wide_and(sure, _mm256_cmp_ps(deep.enter, t_max * wide_set(0.9999f), _CMP_LT_OQ));
+    if (kind == PL_SHAPE_CYLINDER) sure = wide_and(sure, _mm256_cmp_ps(d[0] * d[0] + d[1] * d[1], wide_set(1e-30f), _CMP_GT_OQ));
+    return wide_mask_of(sure);
+}
+
+/* The rays of a packet's frame that can have a root in a primitive; certain: NULL, or those that must. */
+static inline unsigned filter_lanes(const pl_front_primitive *p, uint32_t kind, const pl_packet_frame *f, unsigned lanes,
+                                    unsigned *certain)
+{
+    if (certain) *certain = 0;
     if (kind == PL_KIND_MESH || kind == PL_SHAPE_PLANE) return lanes;
     const float margin = p->stretch * f->slack + 0x1p-19f, *m = p->columns;
     unsigned found = 0;
@@ -125,7 +140,11 @@ static inline unsigned filter_lanes(const pl_front_primitive *p, uint32_t kind, 
         const wide latest = wide_min(i.leave, wide_load(f->t_max + first));
         const wide met = wide_and(_mm256_cmp_ps(i.enter, latest, _CMP_LE_OQ),
                                   _mm256_cmp_ps(i.leave, wide_set(0.0f), _CMP_GE_OQ));
-        found |= wide_mask_of(met) << first;
+        const unsigned eight = wide_mask_of(met);
+        found |= eight << first;
+        if (certain && eight & lanes >> first)
+            *certain |= (eight & certain_lanes(kind, o, d, margin, &i, wide_load(f->t_max + first))) << first;
     }
+    if (certain) *certain &= lanes;
     return found & lanes;
 }

@@ -273,10 +273,21 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     return true;
 }
 
+/* Those of some lanes whose queries want more. */
+static inline unsigned lanes_left(const pl_query *queries, unsigned lanes)
+{
+    unsigned left = 0;
+    for (unsigned rest = lanes; rest; rest &= rest - 1) {
+        const int lane = __builtin_ctz(rest);
+        left |= (unsigned)!queries[lane].done << lane;
+    }
+    return left;
+}
+
 /* --- the loop --- */
 
 /* The rays of some lanes one by one through what lies below frame `index` of the packet. */
-static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max)
+static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, bool any)
 {
     pl_bvh_work *w = tracer->work;
     const pl_packet_frame *from = &w->packets[index];
@@ -301,7 +312,8 @@ static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, 
             w->frames[0].normative_o[axis] = w->packets[0].normative.o[axis][lane];
             w->frames[0].normative_d[axis] = w->packets[0].normative.d[axis][lane];
         }
-        if (!visit(tracer, &queries[lane], index, met, false)) return false;
+        if (any ? !visit(tracer, &queries[lane], index, met, true) : !visit(tracer, &queries[lane], index, met, false))
+            return false;
         t_max[lane] = queries[lane].t_max;
     }
     return true;
@@ -339,36 +351,47 @@ static inline void descend_lanes(pl_packet_frame *f, const pl_packet_frame *pare
 }
 
 /* A frame's unbounded primitives for some lanes; *all: there are unbounded instances, which only single rays go into. */
-static inline bool offer_unbounded(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, bool *all)
+static inline bool offer_unbounded(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, bool any,
+                                   bool *all)
 {
     pl_bvh_work *w = tracer->work;
     const pl_front *front = w->packets[index].front;
     *all = false;
     for (uint32_t i = 0; i < front->unbounded_count; i++) *all = *all || front->unbounded[i] >> PL_REF_SHIFT == PL_KIND_INSTANCE;
-    if (*all) return visit_one_by_one(tracer, index, lanes, queries, t_max);
+    if (*all) return visit_one_by_one(tracer, index, lanes, queries, t_max, any);
     for (uint32_t i = 0; i < front->unbounded_count; i++)
-        if (!offer_lanes(tracer, index, front->unbounded[i], lanes, queries, t_max)) return false;
+        if (!offer_lanes(tracer, index, front->unbounded[i], any ? lanes_left(queries, lanes) : lanes, queries, t_max))
+            return false;
     return true;
 }
 
 /* Begins frame `index` of the packet, whose rays are set; false in *beams: nothing is left to be done in it. */
-static inline bool enter_lanes(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, beam *b,
-                               bool *beams)
+static inline bool enter_lanes(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, bool any,
+                               beam *b, bool *beams)
 {
     pl_packet_frame *f = &((pl_bvh_work *)tracer->work)->packets[index];
     bool done;
     *beams = false;
     if (f->front->unbounded_count) {
-        if (!offer_unbounded(tracer, index, lanes, queries, t_max, &done)) return false;
-        if (done) return true;
+        if (!offer_unbounded(tracer, index, lanes, queries, t_max, any, &done)) return false;
+        if (any) lanes = lanes_left(queries, lanes);
+        if (done || !lanes) return true;
     }
     enum course course = begin_lanes(f, lanes, t_max);
     if (course == AS_BEAM && !look_along(b, f)) course = ONE_BY_ONE;
     *beams = course == AS_BEAM;
-    return course != ONE_BY_ONE || visit_one_by_one(tracer, index, f->lanes, queries, t_max);
+    return course != ONE_BY_ONE || visit_one_by_one(tracer, index, f->lanes, queries, t_max, any);
 }
 
-static bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, double *t_max)
+/* Goes on with a frame after some of its rays met something. false: none of them wants more. */
+static inline bool go_on(pl_packet_frame *f, const pl_query *queries, const double *t_max, bool any)
+{
+    if (any) f->lanes = lanes_left(queries, f->lanes);
+    set_t_max(f, t_max);
+    return f->lanes != 0;
+}
+
+static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, double *t_max, bool any)
 {
     pl_bvh_work *w = tracer->work;
     const pl_fronts *fronts = tracer->scene->structure;
@@ -379,7 +402,7 @@ static bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, d
     size_t top = 0;
     bool beams;
     beam b;
-    if (!enter_lanes(tracer, 0, lanes, queries, t_max, &b, &beams)) return false;
+    if (!enter_lanes(tracer, 0, lanes, queries, t_max, any, &b, &beams)) return false;
     if (!beams) return true;
     pl_packet_frame *f = &w->packets[0];
     uint64_t *stack = w->packet_stack;
@@ -389,6 +412,7 @@ static bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, d
         const uint64_t at = stack[--top];
         pl_ref ref = (pl_ref)at;
         if (entry_is_beyond(at, f->most)) continue;
+        if (any && !f->lanes && ref >> PL_REF_SHIFT != PL_KIND_RETURN) continue;
         while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
             const unsigned count = meet_beam(&b, f->most, &f->front->nodes[ref], stack + top, &ref);
             steps++;
@@ -403,8 +427,7 @@ static bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, d
         if (kind == PL_KIND_RETURN) {
             if (index == 0) break;
             f = &w->packets[--index];
-            set_t_max(f, t_max);
-            look_along(&b, f);
+            if (go_on(f, queries, t_max, any)) look_along(&b, f);
         } else if (kind == PL_KIND_INSTANCE) {
             const uint32_t instance = ref & PL_REF_INDEX;
             const pl_front_instance *it = &f->front->instances[instance];
@@ -417,13 +440,12 @@ static bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, d
             w->frames[index + 1].front = inner->front;
             tracer->counters.instances++;
             descend_lanes(inner, f, it);
-            if (!enter_lanes(tracer, index + 1, f->lanes, queries, t_max, &b, &beams)) return false;
+            if (!enter_lanes(tracer, index + 1, f->lanes, queries, t_max, any, &b, &beams)) return false;
             if (beams) {
                 f = &w->packets[++index];
                 stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
                 stack[top++] = entry_of(0.0f, f->front->root);
-            } else {
-                set_t_max(f, t_max);
+            } else if (go_on(f, queries, t_max, any)) {
                 look_along(&b, f);
             }
             if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
@@ -431,10 +453,15 @@ static bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, d
             const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
             if (shadow && p->item & PL_NO_SHADOW) continue;
             tracer->counters.filtered++;
-            const unsigned found = filter_lanes(p, kind, f, f->lanes);
+            unsigned certain = 0;
+            const unsigned found = filter_lanes(p, kind, f, f->lanes, any ? &certain : NULL);
             if (!found) continue;
-            if (!offer_lanes(tracer, index, ref, found, queries, t_max)) return false;
-            set_t_max(f, t_max);
+            for (unsigned rest = certain; rest; rest &= rest - 1) {
+                pl_query *query = &queries[__builtin_ctz(rest)];
+                query->found = query->done = true;
+            }
+            if (found & ~certain && !offer_lanes(tracer, index, ref, found & ~certain, queries, t_max)) return false;
+            go_on(f, queries, t_max, any);
             if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
         }
     next:;
@@ -481,7 +508,9 @@ bool PACKET_KERNEL(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, uns
     load_rays(&w->packets[0], ((const pl_fronts *)tracer->scene->structure)->list, rays, queries, count, t_max);
     w->frames[0].front = w->packets[0].front;
     w->frames[0].instance = 0;
-    const bool ok = visit_packet(tracer, (1u << count) - 1, queries, t_max);
+    const unsigned lanes = (1u << count) - 1;
+    const bool ok = queries->kind == PL_QUERY_ANY ? visit_packet(tracer, lanes, queries, t_max, true)
+                                                  : visit_packet(tracer, lanes, queries, t_max, false);
     wide_end();
     return ok;
 }

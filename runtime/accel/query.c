@@ -111,7 +111,10 @@ static bool keep(pl_query *query, const pl_leaf *leaf, const pl_root *root)
     switch (query->kind) {
     case PL_QUERY_NEAREST: return keep_nearest(query, leaf, root);
     case PL_QUERY_ALL: return keep_listed(query, leaf, root);
-    default: query->done = true; return true;
+    default: /* one is enough: what goes together with others' rays needn't go on */
+        query->done = true;
+        query->t_max = query->t_min;
+        return true;
     }
 }
 

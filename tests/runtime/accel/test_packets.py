@@ -90,7 +90,7 @@ def test_packets_share_their_steps():
 
 @pytest.mark.parametrize("size", [(32, 32), (19, 13), (3, 2), (1, 1)])
 def test_pictures_are_the_same_whose_rays_go_together(size):
-    """Blocks of pixels at the picture's edges are smaller; with another channel every ray goes alone."""
+    """Blocks of pixels at the picture's edges are smaller; with another channel pixels come one by one."""
     data = compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 6})
     with Scene(data) as scene:
         together = scene.render(*size)["color"]
@@ -99,3 +99,43 @@ def test_pictures_are_the_same_whose_rays_go_together(size):
         expected = scene.render(*size)["color"]
     np.testing.assert_array_equal(together, expected)
     np.testing.assert_array_equal(alone, expected)
+
+
+ANTIALIAS = [dict(antialias="off"), dict(antialias="grid", samples=2), dict(antialias="adaptive", samples=3, threshold=0.05)]
+
+
+@pytest.mark.parametrize("options", ANTIALIAS, ids=lambda options: options["antialias"])
+@pytest.mark.parametrize("name", ["shading", "mirrors", "menger"])
+def test_shadows_and_samples_go_together_unseen(name, options):
+    """Patterns, transparent things, several lights, mirrors: by packets, one by one, and by another accelerator."""
+    data = compile(ROOT / "scenes" / f"{name}.plsys", parameters=SCENES[name])
+    with Scene(data, accelerator="boxes") as scene:
+        expected = scene.render(37, 29, **options)["color"]
+    for isa in available(data):
+        with Scene(data, isa=isa) as scene:
+            np.testing.assert_array_equal(scene.render(37, 29, **options)["color"], expected, err_msg=isa)
+            alone = scene.render(37, 29, channels=("color", "boxes"), **options)["color"]
+            np.testing.assert_array_equal(alone, expected, err_msg=isa)
+
+
+def test_shadow_packets_share_their_steps():
+    data = compile(ROOT / "scenes" / "menger.plsys", parameters={"level": 3})
+    origins, directions = bundles(data, 5)
+    narrow, tests = slice(0, SIDE * SIDE), {}
+    for isa in available(data):
+        with Scene(data, isa=isa, threads=1) as scene:
+            scene.occluded(origins[narrow], directions[narrow])
+            tests[isa] = scene.statistics["box_tests"]
+    for isa, count in tests.items():
+        assert isa == "scalar" or count < 0.5 * tests["scalar"]
+
+
+@pytest.mark.parametrize("count", [1, 16])
+def test_a_ray_along_a_cylinder_s_axis_and_beside_it_is_free(count):
+    """It meets the cylinder's box, and its distance from the axis is all that tells."""
+    data = compile("camera { location -9 look_at 0 } cylinder { 0, <0, 0, 1>, 1 pigment { color rgb 1 } }")
+    for isa in available(data):
+        with Scene(data, isa=isa) as scene:
+            for x, blocked in ((0.9, False), (0.5, True)):
+                origins = np.tile([x, x, -5.0], (count, 1))
+                assert scene.occluded(origins, (0, 0, 1)).tolist() == [blocked] * count, isa
