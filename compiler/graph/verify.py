@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from functools import cache
 
 from ..bytecode.layout_rows import LIMITS, OPCODES, SHAPES
 from ..reading.model import Apply, Assign, Constant, Expression, Read, Step, Variants
@@ -103,13 +104,18 @@ RULES: tuple[tuple[type, str, Callable[[g.Graph, g.Node], bool]], ...] = (
 )
 
 
+@cache
+def _rules_of(kind: type[g.Node]) -> tuple[tuple[str, Callable[[g.Graph, g.Node], bool]], ...]:
+    return tuple((rule, test) for base, rule, test in RULES if issubclass(kind, base))
+
+
 def verify(graph: g.Graph, after: str) -> None:
     """Raises InvalidGraph, naming the pass ``after`` which the graph is wrong."""
     if not graph.nodes:
         raise InvalidGraph(f"after {after}: there is no root")
     for i, node in enumerate(graph.nodes):
-        for kind, rule, test in RULES:
-            if isinstance(node, kind) and not test(graph, node):
+        for rule, test in _rules_of(type(node)):
+            if not test(graph, node):
                 raise InvalidGraph(f"after {after}: {i} {print_node(node)}: {rule}")
     _verify_root(graph, after)
     _verify_cycles(graph, after)

@@ -176,46 +176,6 @@ static inline unsigned meet_beam(const beam *b, float t_max, const pl_front_node
 
 /* --- candidates --- */
 
-/* pl_map_ray for the rays of some quads, the same operations. */
-static inline void map_lanes(const pl_transform *transform, pl_lanes *rays, unsigned quads)
-{
-    const double *m = transform->to_object.m;
-    for (int i = 0; i < PL_LANES; i += 4) {
-        if (!(quads >> i / 4 & 1)) continue;
-        double4 *o[3], *d[3];
-        for (int axis = 0; axis < 3; axis++) {
-            o[axis] = (double4 *)(rays->o[axis] + i);
-            d[axis] = (double4 *)(rays->d[axis] + i);
-        }
-        if (transform->form == PL_FORM_GENERAL) {
-            const double4 x = *o[0], y = *o[1], z = *o[2], u = *d[0], v = *d[1], w = *d[2];
-            for (int r = 0; r < 3; r++) {
-                *o[r] = m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3];
-                *d[r] = m[4 * r] * u + m[4 * r + 1] * v + m[4 * r + 2] * w;
-            }
-            continue;
-        }
-        for (int axis = 0; axis < 3; axis++) {
-            if (transform->form == PL_FORM_DIAGONAL) {
-                *o[axis] *= m[5 * axis];
-                *d[axis] *= m[5 * axis];
-            }
-            *o[axis] += m[4 * axis + 3];
-        }
-    }
-}
-
-static inline void copy_quads(pl_lanes *to, const pl_lanes *from, unsigned quads)
-{
-    for (int i = 0; i < PL_LANES; i += 4) {
-        if (!(quads >> i / 4 & 1)) continue;
-        for (int axis = 0; axis < 3; axis++) {
-            *(double4 *)(to->o[axis] + i) = *(const double4 *)(from->o[axis] + i);
-            *(double4 *)(to->d[axis] + i) = *(const double4 *)(from->d[axis] + i);
-        }
-    }
-}
-
 static inline bool map_lanes_down(pl_bvh_work *w, const pl_front *front, uint32_t opened, const pl_item *item,
                                   pl_lanes *rays, unsigned quads, pl_error *error)
 {
