@@ -54,11 +54,10 @@ static void set_vector(float *channel, size_t pixel, const double *value)
 
 static void quantise(pl_worker *worker, const double color[3])
 {
+    const pl_channels *channels = worker->job->channels;
     memcpy(worker->color, color, sizeof worker->color);
-    for (int i = 0; i < 3; i++) {
-        worker->srgb[i] = pl_srgb(&worker->job->quantiser, (float)color[i]);
-        worker->linear16[i] = pl_linear_16((float)color[i]);
-    }
+    for (int i = 0; channels->srgb && i < 3; i++) worker->srgb[i] = pl_srgb(&worker->job->quantiser, (float)color[i]);
+    for (int i = 0; channels->linear16 && i < 3; i++) worker->linear16[i] = pl_linear_16((float)color[i]);
 }
 
 /* A pixel's colour, in single precision and in what picture files have of that. */

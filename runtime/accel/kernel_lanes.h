@@ -133,8 +133,9 @@ static inline unsigned filter_lanes(const pl_front_primitive *p, uint32_t kind, 
         const wide v = wide_load(f->direction[1] + first), w = wide_load(f->direction[2] + first);
 #pragma GCC unroll 3
         for (int r = 0; r < 3; r++) {
-            o[r] = m[r] * x + m[3 + r] * y + (m[6 + r] * z + m[9 + r]);
-            d[r] = m[r] * u + m[3 + r] * v + m[6 + r] * w;
+            const wide a = wide_set(m[r]), b = wide_set(m[3 + r]), c = wide_set(m[6 + r]);
+            o[r] = wide_multiply_add(a, x, wide_multiply_add(b, y, wide_multiply_add(c, z, wide_set(m[9 + r]))));
+            d[r] = wide_multiply_add(a, u, wide_multiply_add(b, v, c * w));
         }
         wide_interval i = {wide_set(-1e30f), wide_set(1e30f)};
         shape_lanes(kind, p->argument, o, d, margin, &i);
