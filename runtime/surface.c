@@ -322,7 +322,6 @@ static void items_cut(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, c
 bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface, pl_error *error)
 {
     const pl_accel *accel = tracer->scene->accel;
-    const uint32_t *told;
     bool code;
     if (!accel->items) return walk_surface(tracer, ray, hit, &hit->path, false, surface, error);
     if (!accel->items(tracer->scene, &hit->trail, &tracer->items)) return pl_fail_memory(error, "shading a hit");
@@ -337,8 +336,9 @@ bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, p
         items_surface(tracer, ray, hit, &tracer->items, textured, surface);
         return true;
     }
-    if (hit->cut_depth && !(told = place_of_told(tracer, error))) return false;
-    if (!code && (*told == FIRST_NONE || *told >= FIRST_NODE)) {
+    const uint32_t *told = hit->cut_depth ? place_of_told(tracer, error) : NULL;
+    if (hit->cut_depth && !told) return false;
+    if (told && !code && (*told == FIRST_NONE || *told >= FIRST_NODE)) {
         items_cut(tracer, ray, hit, &tracer->items, textured, *told, surface);
         return true;
     }
