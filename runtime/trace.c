@@ -118,26 +118,26 @@ bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_erro
     return true;
 }
 
-/* false: rays that don't go well together, or one of them has an error: alone they tell which. hits: of the nearest. */
-static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_query_kind kind, pl_hit *hits,
-                         pl_query *queries)
+/* false: it isn't done so, or a ray has an error: alone they tell which. hits: of the nearest. */
+static bool trace_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_query_kind kind, pl_hit *hits,
+                       pl_query *queries)
 {
     const pl_accel *accel = tracer->scene->accel;
     pl_error error;
-    if (!accel->is_packet || !accel->is_packet(tracer, rays, count)) return false;
+    if (!accel->trace_many || count < 2) return false;
     for (unsigned i = 0; i < count; i++) {
         begin_query(&queries[i], tracer, &rays[i], kind, &error);
         if (!hits) continue;
         queries[i].hit = &hits[i];
         begin_hit(&hits[i]);
     }
-    return accel->trace_packet(tracer, rays, queries, count);
+    return accel->trace_many(tracer, rays, queries, count);
 }
 
 unsigned pl_trace_nearest_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_hit *hits, pl_error *error)
 {
     pl_query queries[PL_TRACE_MANY];
-    if (trace_packet(tracer, rays, count, PL_QUERY_NEAREST, hits, queries)) return count;
+    if (trace_many(tracer, rays, count, PL_QUERY_NEAREST, hits, queries)) return count;
     for (unsigned i = 0; i < count; i++)
         if (!pl_trace_nearest(tracer, &rays[i], &hits[i], error)) return i;
     return count;
@@ -162,7 +162,7 @@ int pl_trace_any(pl_tracer *tracer, const pl_ray *ray, pl_error *error)
 unsigned pl_trace_any_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, bool *blocked, pl_error *error)
 {
     pl_query queries[PL_TRACE_MANY];
-    if (trace_packet(tracer, rays, count, PL_QUERY_ANY, NULL, queries)) {
+    if (trace_many(tracer, rays, count, PL_QUERY_ANY, NULL, queries)) {
         for (unsigned i = 0; i < count; i++) blocked[i] = queries[i].found;
         return count;
     }

@@ -94,9 +94,8 @@ struct pl_accel {
     void (*work_destroy)(void *work);
     /* Offers all leaves that matter. false: an error. */
     bool (*trace)(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
-    /* Of up to PL_TRACE_MANY rays: whether they go well together, and tracing them so. NULL: one by one. */
-    bool (*is_packet)(const pl_tracer *tracer, const pl_ray *rays, unsigned count);
-    bool (*trace_packet)(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
+    /* The same for up to PL_TRACE_MANY rays. NULL: one by one. */
+    bool (*trace_many)(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
     /* The items from the scene's to the leaf's at a trail; none: there is a path. NULL: its hits have paths. false: no memory. */
     bool (*items)(const pl_scene *scene, const pl_path *trail, pl_items *items);
     /* The path in union terms at a trail that has no items. false: no memory. */

@@ -8,28 +8,30 @@
 
 /* --- working memory --- */
 
+static void work_destroy(void *memory)
+{
+    pl_bvh_work *w = memory;
+    if (!w) return;
+    for (int i = 0; i < PL_LANES; i++) {
+        free(w->lanes[i].frames);
+        free(w->lanes[i].stack);
+    }
+    free(w->chain);
+    free(w->packets);
+    free(w->packet_stack);
+    free(w);
+}
+
 static void *work_create(const pl_scene *scene, pl_error *error)
 {
     pl_bvh_work *w = calloc(1, sizeof *w);
-    if (!w || !pl_bvh_grow_frames(w, 0, error) || !pl_bvh_grow_stack(w, 0, error)) {
-        free(w);
+    if (!w || !pl_bvh_grow_frames(w->lanes, 0, error) || !pl_bvh_grow_stack(w->lanes, 0, error)) {
+        work_destroy(w);
         pl_fail_memory(error, "preparing to trace");
         return NULL;
     }
     w->states = &scene->states;
     return w;
-}
-
-static void work_destroy(void *memory)
-{
-    pl_bvh_work *w = memory;
-    if (!w) return;
-    free(w->frames);
-    free(w->stack);
-    free(w->chain);
-    free(w->packets);
-    free(w->packet_stack);
-    free(w);
 }
 
 static bool grow(void *array, size_t least, size_t *capacity, size_t element, pl_error *error)
@@ -43,19 +45,19 @@ static bool grow(void *array, size_t least, size_t *capacity, size_t element, pl
     return true;
 }
 
-bool pl_bvh_grow_frames(pl_bvh_work *w, size_t count, pl_error *error)
+bool pl_bvh_grow_frames(pl_bvh_lane *lane, size_t count, pl_error *error)
 {
-    return grow(&w->frames, count + 1, &w->frame_capacity, sizeof *w->frames, error);
+    return grow(&lane->frames, count + 1, &lane->frame_capacity, sizeof *lane->frames, error);
 }
 
-bool pl_bvh_grow_stack(pl_bvh_work *w, size_t top, pl_error *error)
+bool pl_bvh_grow_stack(pl_bvh_lane *lane, size_t top, pl_error *error)
 {
-    return grow(&w->stack, top + 64, &w->stack_capacity, sizeof *w->stack, error);
+    return grow(&lane->stack, top + 64, &lane->stack_capacity, sizeof *lane->stack, error);
 }
 
 bool pl_bvh_grow_packets(pl_bvh_work *w, size_t count, pl_error *error)
 {
-    return pl_bvh_grow_frames(w, count, error) &&
+    return pl_bvh_grow_frames(w->lanes, count, error) &&
            grow(&w->packets, count + 1, &w->packet_capacity, sizeof *w->packets, error);
 }
 
@@ -79,47 +81,15 @@ bool pl_bvh_chain(pl_bvh_work *w, const pl_front *front, uint32_t opened, size_t
     return true;
 }
 
-/* Maps a ray from a front's state to an item of an opened node, one transformation after another. */
-static bool map_down(pl_bvh_work *w, const pl_front *front, uint32_t opened, const pl_item *item, double o[3],
-                     double d[3], pl_error *error)
-{
-    size_t count;
-    if (!pl_bvh_chain(w, front, opened, &count, error)) return false;
-    while (count > 0) {
-        const pl_item *at = w->chain[--count];
-        for (uint32_t i = 0; i < at->transform_count; i++) pl_map_ray(at->transforms[i], o, d);
-    }
-    for (uint32_t i = 0; i < item->transform_count; i++) pl_map_ray(item->transforms[i], o, d);
-    return true;
-}
-
 static const pl_item *instance_item(const pl_scene *scene, const pl_front *front, uint32_t instance)
 {
     return pl_front_item(&scene->states, front->places[instance].item);
 }
 
-/* The normative ray of a frame, from the deepest frame above that has one. */
-static bool map_frame(const pl_scene *scene, pl_bvh_work *w, uint32_t index, pl_error *error)
-{
-    uint32_t from = index;
-    while (!w->frames[from].mapped) from--;
-    for (; from < index; from++) {
-        const pl_frame *parent = &w->frames[from];
-        pl_frame *f = &w->frames[from + 1];
-        memcpy(f->normative_o, parent->normative_o, sizeof f->normative_o);
-        memcpy(f->normative_d, parent->normative_d, sizeof f->normative_d);
-        if (!map_down(w, parent->front, parent->front->places[f->instance].opened,
-                      instance_item(scene, parent->front, f->instance), f->normative_o, f->normative_d, error))
-            return false;
-        f->mapped = true;
-    }
-    return true;
-}
-
 /* A leaf's place: frames 1 … frame, then a primitive. */
 typedef struct place {
     const pl_scene *scene;
-    const pl_bvh_work *work;
+    const pl_bvh_lane *lane;
     uint32_t frame;
     pl_ref ref;
 } place;
@@ -129,16 +99,16 @@ static bool write_trail(const void *source, pl_path *trail)
     const place *p = source;
     while (trail->capacity <= p->frame)
         if (!pl_path_push(trail, trail->capacity, 0)) return false;
-    for (uint32_t i = 0; i < p->frame; i++) trail->terms[i] = p->work->frames[i + 1].instance;
+    for (uint32_t i = 0; i < p->frame; i++) trail->terms[i] = p->lane->frames[i + 1].instance;
     trail->terms[p->frame] = p->ref;
     trail->length = p->frame + 1;
     return true;
 }
 
-bool pl_bvh_offer(pl_tracer *tracer, uint32_t frame, pl_ref ref, const pl_item *item, const double o[3],
-                  const double d[3], pl_query *query)
+bool pl_bvh_offer(pl_tracer *tracer, const pl_bvh_lane *lane, uint32_t frame, pl_ref ref, const pl_item *item,
+                  const double o[3], const double d[3], pl_query *query)
 {
-    place p = {tracer->scene, tracer->work, frame, ref};
+    place p = {tracer->scene, lane, frame, ref};
     pl_leaf leaf = {
         .shape = item->what,
         .arguments = item->arguments,
@@ -150,21 +120,6 @@ bool pl_bvh_offer(pl_tracer *tracer, uint32_t frame, pl_ref ref, const pl_item *
     };
     tracer->counters.primitive_tests++;
     return pl_query_leaf(query, &leaf);
-}
-
-bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query)
-{
-    pl_bvh_work *w = tracer->work;
-    const pl_scene *scene = tracer->scene;
-    pl_frame *f = &w->frames[frame];
-    const pl_front_primitive *primitive = &f->front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = pl_front_item(&scene->states, primitive->item);
-    double o[3], d[3];
-    if (!f->mapped && !map_frame(scene, w, frame, query->error)) return false;
-    memcpy(o, f->normative_o, sizeof o);
-    memcpy(d, f->normative_d, sizeof d);
-    return map_down(w, f->front, primitive->opened, item, o, d, query->error) &&
-           pl_bvh_offer(tracer, frame, ref, item, o, d, query);
 }
 
 /* --- from a trail to the items on the path --- */
@@ -211,21 +166,17 @@ bool pl_bvh_are_alike(const pl_ray *rays, unsigned count, double scale)
     return count >= PL_LEAST_LANES;
 }
 
-static bool is_packet(const pl_tracer *tracer, const pl_ray *rays, unsigned count)
+static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
 {
-    return tracer->scene->isa != PL_ISA_SCALAR &&
-           pl_bvh_are_alike(rays, count, ((const pl_fronts *)tracer->scene->structure)->list->scale);
-}
-
-static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
-{
+    pl_bvh_many_kernel *kernel = pl_bvh_stream_scalar;
 #ifdef __x86_64__
-    if (tracer->scene->isa == PL_ISA_AVX512) return pl_bvh_packet_avx512(tracer, rays, queries, count);
-    return pl_bvh_packet_avx2(tracer, rays, queries, count);
-#else
-    (void)tracer, (void)rays, (void)queries, (void)count;
-    return false;
+    const int isa = tracer->scene->isa;
+    const double scale = ((const pl_fronts *)tracer->scene->structure)->list->scale;
+    if (isa != PL_ISA_SCALAR && pl_bvh_are_alike(rays, count, scale))
+        kernel = isa == PL_ISA_AVX512 ? pl_bvh_packet_avx512 : pl_bvh_packet_avx2;
+    else if (isa != PL_ISA_SCALAR) kernel = isa == PL_ISA_AVX512 ? pl_bvh_stream_avx512 : pl_bvh_stream_avx2;
 #endif
+    return kernel(tracer, rays, queries, count);
 }
 
 const pl_accel pl_accel_bvh = {.name = "bvh",
@@ -235,6 +186,5 @@ const pl_accel pl_accel_bvh = {.name = "bvh",
                                .work_create = work_create,
                                .work_destroy = work_destroy,
                                .trace = trace,
-                               .is_packet = is_packet,
-                               .trace_packet = trace_packet,
+                               .trace_many = trace_many,
                                .items = trail_items};

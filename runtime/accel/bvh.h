@@ -19,7 +19,9 @@ typedef struct pl_frame {
     bool mapped;           /* normative_… are known */
     uint32_t instance;
     float origin[4], direction[4], inverse[4];
-    double normative_o[3], normative_d[3];
+    float near_base[4], far_base[4];      /* (origin moved by the slack) / direction */
+    uint32_t near_row[4], far_row[4];     /* offsets of a node's planes, in floats */
+    double normative_o[4], normative_d[4];
 } pl_frame;
 
 enum {
@@ -45,12 +47,18 @@ typedef struct pl_packet_frame {
     pl_lanes normative;
 } pl_packet_frame;
 
-typedef struct pl_bvh_work {
-    const pl_states *states;
+/* A ray's own memory. */
+typedef struct pl_bvh_lane {
     pl_frame *frames;
     uint64_t *stack; /* local t of entry as float bits, reference below */
+    size_t frame_capacity, stack_capacity;
+} pl_bvh_lane;
+
+typedef struct pl_bvh_work {
+    const pl_states *states;
+    pl_bvh_lane lanes[PL_LANES]; /* the first one for single rays, the others from when they are needed */
     const pl_item **chain;
-    size_t frame_capacity, stack_capacity, chain_capacity;
+    size_t chain_capacity;
     pl_packet_frame *packets;
     uint64_t *packet_stack;
     size_t packet_capacity, packet_stack_capacity;
@@ -59,26 +67,24 @@ typedef struct pl_bvh_work {
 typedef bool pl_bvh_kernel(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
 extern pl_bvh_kernel pl_bvh_trace_scalar, pl_bvh_trace_avx2, pl_bvh_trace_avx512;
 
-typedef bool pl_bvh_packet_kernel(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
-extern pl_bvh_packet_kernel pl_bvh_packet_avx2, pl_bvh_packet_avx512;
-
-/* Whether rays go well together: all directions lie about the first's, and so do the origins, as seen from the size of what
- * is traced; scale: 1 / half of it. */
+/* Of several rays, whether or not they go the same way. */
+typedef bool pl_bvh_many_kernel(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
+extern pl_bvh_many_kernel pl_bvh_stream_scalar, pl_bvh_stream_avx2, pl_bvh_stream_avx512;
+extern pl_bvh_many_kernel pl_bvh_packet_avx2, pl_bvh_packet_avx512;
+/* Whether rays go well together as a packet: all directions lie about the first's, and so do the origins, as seen from the size
+ * of what is traced; scale: 1 / half of it. */
 bool pl_bvh_are_alike(const pl_ray *rays, unsigned count, double scale);
 
-/* Evaluates a primitive of a frame normatively and offers it. false: an error. */
-bool pl_bvh_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query);
-
 /* Offers a primitive of a frame with the normative ray in the primitive's own frame. */
-bool pl_bvh_offer(pl_tracer *tracer, uint32_t frame, pl_ref ref, const pl_item *item, const double o[3],
-                  const double d[3], pl_query *query);
+bool pl_bvh_offer(pl_tracer *tracer, const pl_bvh_lane *lane, uint32_t frame, pl_ref ref, const pl_item *item,
+                  const double o[3], const double d[3], pl_query *query);
 
 /* The items with transformations on the way to an opened node, into work->chain, the last one first. */
 bool pl_bvh_chain(pl_bvh_work *work, const pl_front *front, uint32_t opened, size_t *count, pl_error *error);
 
 /* Room for one more frame, for eight more entries above `top`; false: no memory. */
-bool pl_bvh_grow_frames(pl_bvh_work *work, size_t count, pl_error *error);
-bool pl_bvh_grow_stack(pl_bvh_work *work, size_t top, pl_error *error);
+bool pl_bvh_grow_frames(pl_bvh_lane *lane, size_t count, pl_error *error);
+bool pl_bvh_grow_stack(pl_bvh_lane *lane, size_t top, pl_error *error);
 bool pl_bvh_grow_packets(pl_bvh_work *work, size_t count, pl_error *error);
 bool pl_bvh_grow_packet_stack(pl_bvh_work *work, size_t top, pl_error *error);
 

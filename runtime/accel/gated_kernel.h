@@ -24,7 +24,8 @@ static inline passage passage_of(const pl_frame *f)
     if (f->blind) return (passage){-INFINITY, INFINITY};
     const float4 inverse = *(const float4 *)f->inverse, middle = *(const float4 *)f->origin * inverse;
     const float4 reach = (*(const float4 *)f->front->half + f->slack) * absolute(inverse);
-    const double enter = (double)greatest_of(-middle - reach), leave = (double)least_of(reach - middle);
+    const float4 ends = least_of(reach + middle, reach - middle);
+    const double enter = -(double)ends[0], leave = (double)ends[1];
     const double over = 1.0 / f->rate;
     return (passage){f->t0 + (enter > 0.0 ? enter : 0.0) * (1.0 - 0x1p-16) * over,
                      f->t0 + (leave > 0.0 ? leave : 0.0) * (1.0 + 0x1p-16) * over};
@@ -117,17 +118,16 @@ static inline bool gated_visit(pl_tracer *tracer, pl_query *query, bool met, boo
     uint32_t frame = 0;
     const pl_gated_frame *f = &w->frames[0];
     size_t top = 0;
-    near n;
+    float t_max;
     if (!gated_begin(w, f->at.front, met, &top, query->error)) return false;
     stack = w->stack;
-    look(&n, &f->at);
-    n.t_max = local_t_max(&f->at, query->t_max);
+    t_max = local_t_max(&f->at, query->t_max);
     for (;;) {
         uint64_t at = stack[--top];
         pl_ref ref = (pl_ref)at;
-        if (entry_is_beyond(at, n.t_max)) continue;
+        if (entry_is_beyond(at, t_max)) continue;
         while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
-            unsigned count = meet(&n, &f->at.front->nodes[ref], stack + top, &ref);
+            unsigned count = meet_nearest(&f->at, t_max, &f->at.front->nodes[ref], stack + top, &ref);
             steps++;
             if (count == 0) goto next;
             top += count - 1;
@@ -140,29 +140,27 @@ static inline bool gated_visit(pl_tracer *tracer, pl_query *query, bool met, boo
         if (kind == PL_KIND_RETURN) {
             if (frame == 0) break;
             f = &w->frames[--frame];
-            look(&n, &f->at);
-            n.t_max = local_t_max(&f->at, query->t_max);
+            t_max = local_t_max(&f->at, query->t_max);
         } else if (kind == PL_KIND_INSTANCE) {
-            float t_max = n.t_max;
-            int entered = gated_descend(tracer, frame, ref & PL_REF_INDEX, query, &t_max);
+            float inner = t_max;
+            int entered = gated_descend(tracer, frame, ref & PL_REF_INDEX, query, &inner);
             if (entered < 0) return false;
             if (query->done) break;
             if (entered) frame++;
             f = &w->frames[frame]; /* which may have moved */
             if (!entered) {
-                n.t_max = local_t_max(&f->at, query->t_max); /* a box may have been drawn */
+                t_max = local_t_max(&f->at, query->t_max); /* a box may have been drawn */
                 continue;
             }
-            n.t_max = t_max;
+            t_max = inner;
             if (!gated_begin(w, f->at.front, entered == 1, &top, query->error)) return false;
             stack = w->stack;
-            look(&n, &f->at);
             if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
         } else {
             const pl_front_primitive *p = &f->at.front->primitives[ref & PL_REF_INDEX];
             if (query->shadow && p->item & PL_NO_SHADOW) continue;
             tracer->counters.filtered++;
-            enum kernel_verdict verdict = filter(p, kind, &f->at, n.t_max, any);
+            enum kernel_verdict verdict = filter(p, kind, &f->at, t_max, any);
             if (verdict == MISS) continue;
             if (any && verdict == CERTAIN) {
                 query->found = query->done = true;
@@ -171,7 +169,7 @@ static inline bool gated_visit(pl_tracer *tracer, pl_query *query, bool met, boo
             wide_end();
             if (!pl_gated_candidate(tracer, frame, ref, query)) return false;
             if (query->done) break;
-            n.t_max = local_t_max(&f->at, query->t_max);
+            t_max = local_t_max(&f->at, query->t_max);
             if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
         }
     next:;
@@ -211,8 +209,8 @@ bool GATED_KERNEL(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     root->rung = choose_rung(root->rung, state->count, root, &query->footprint);
     root->at.front = &root->rung->front;
     root->at.mapped = root->placed = true;
-    memcpy(root->at.normative_o, ray->origin, sizeof root->at.normative_o);
-    memcpy(root->at.normative_d, ray->direction, sizeof root->at.normative_d);
+    memcpy(root->at.normative_o, ray->origin, sizeof ray->origin);
+    memcpy(root->at.normative_d, ray->direction, sizeof ray->direction);
     root->place = (pl_gated_place){.stretch = 1.0, .within = {query->t_min, INFINITY}};
     memcpy(root->place.o, ray->origin, sizeof root->place.o);
     memcpy(root->place.d, ray->direction, sizeof root->place.d);

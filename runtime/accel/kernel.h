@@ -1,14 +1,16 @@
 /* kernel.h - the traversal of fronts, compiled once for each instruction set by a kernel_*.c that defines the eight-wide
  * operations (wide, wide_load, wide_order, …) and KERNEL, the name of the function.
  *
- * Single ray, nearest child first. The stack holds 64-bit entries, the local t of entry in the high half (but for its last
- * three bits), so that they sort as integers; an instance pushes a PL_KIND_RETURN entry below its own. All that is
- * computed here in single precision filters only (front.h), so instruction sets can't show in hits. */
+ * A ray goes to the nearest child first; kernel_stream.h and kernel_packet.h take several rays at once. The stack holds
+ * 64-bit entries, the local t of entry in the high half (but for its last three bits), so that they sort as integers; an
+ * instance pushes a PL_KIND_RETURN entry below its own. All that is computed in single precision filters only
+ * (front.h), so instruction sets can't show in hits. */
 #include "bvh.h"
 
+#include <math.h>
 #include <string.h>
 
-enum kernel_verdict { MISS, CANDIDATE, CERTAIN };
+#include "kernel_filter.h"
 
 static inline uint64_t entry_of(float t, pl_ref ref)
 {
@@ -25,111 +27,6 @@ static inline bool entry_is_beyond(uint64_t entry, float t_max)
     return ((uint32_t)(entry >> 32) & ~(uint32_t)(PL_FRONT_WIDTH - 1)) > bits;
 }
 
-/* [enter, leave], the ray's interval in the shape widened by the margin. Every constraint narrows it by itself, and each
- * is widened, so the interval holds the normative roots. NaN constrains nothing. */
-typedef struct interval {
-    float enter, leave;
-} interval;
-
-static inline void between(interval *i, float o, float inverse, float lo, float hi)
-{
-    float a = (lo - o) * inverse, b = (hi - o) * inverse;
-    float near_t = a < b ? a : b, far_t = a < b ? b : a;
-    if (near_t > i->enter) i->enter = near_t;
-    if (far_t < i->leave) i->leave = far_t;
-}
-
-/* a·t² + 2b·t + c <= 0 with a >= 0 and the discriminant given. */
-static inline bool inside_quadric(interval *i, float a, float b, float discriminant)
-{
-    if (!(a > 1e-30f)) return true; /* along the axis: the caller's other constraints remain */
-    if (discriminant < 0.0f) return false;
-    float root = __builtin_sqrtf(discriminant), over = 1.0f / a;
-    float near_t = (-b - root) * over, far_t = (-b + root) * over;
-    if (near_t > i->enter) i->enter = near_t;
-    if (far_t < i->leave) i->leave = far_t;
-    return true;
-}
-
-static inline float inverse_of(float d)
-{
-    return 1.0f / (__builtin_fabsf(d) > 1e-30f ? d : __builtin_copysignf(1e-30f, d));
-}
-
-/* What of the ray o + t·d is within `grow` of a unit shape; false: nothing. grow < 0 gives what lies as deep inside. */
-static inline bool shape_interval(uint32_t kind, float argument, const float o[3], const float d[3], float grow,
-                                  interval *i)
-{
-    switch (kind) {
-    case PL_SHAPE_SPHERE: {
-        float a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], r = 1.0f + grow;
-        float x = o[1] * d[2] - o[2] * d[1], y = o[2] * d[0] - o[0] * d[2], z = o[0] * d[1] - o[1] * d[0];
-        return inside_quadric(i, a, o[0] * d[0] + o[1] * d[1] + o[2] * d[2], a * r * r - (x * x + y * y + z * z));
-    }
-    case PL_SHAPE_DISC:
-    case PL_SHAPE_CYLINDER: {
-        float a = d[0] * d[0] + d[1] * d[1], r = 1.0f + grow, cross = o[0] * d[1] - o[1] * d[0];
-        between(i, o[2], inverse_of(d[2]), -grow, (kind == PL_SHAPE_CYLINDER ? 1.0f : 0.0f) + grow);
-        return inside_quadric(i, a, o[0] * d[0] + o[1] * d[1], a * r * r - cross * cross);
-    }
-    case PL_SHAPE_CONE: {
-        /* Within a cylinder as wide as the cone's wider end; its side is left to double precision. */
-        float a = d[0] * d[0] + d[1] * d[1], r = (argument > 1.0f ? argument : 1.0f) + grow;
-        float cross = o[0] * d[1] - o[1] * d[0];
-        between(i, o[2], inverse_of(d[2]), -grow, 1.0f + grow);
-        return inside_quadric(i, a, o[0] * d[0] + o[1] * d[1], a * r * r - cross * cross);
-    }
-    case PL_SHAPE_TORUS: {
-        float r = 1.0f + argument + grow, h = argument + grow;
-        between(i, o[0], inverse_of(d[0]), -r, r);
-        between(i, o[1], inverse_of(d[1]), -r, r);
-        between(i, o[2], inverse_of(d[2]), -h, h);
-        return true;
-    }
-    case PL_SHAPE_BOX:
-    case PL_SHAPE_TRIANGLE:
-    case PL_SHAPE_SQUARE:
-        between(i, o[0], inverse_of(d[0]), -grow, 1.0f + grow);
-        between(i, o[1], inverse_of(d[1]), -grow, 1.0f + grow);
-        between(i, o[2], inverse_of(d[2]), -grow, (kind == PL_SHAPE_BOX ? 1.0f : 0.0f) + grow);
-        if (kind == PL_SHAPE_TRIANGLE) { /* x + y <= 1: a half-plane */
-            float along = d[0] + d[1], t = (1.0f + 2.0f * grow - o[0] - o[1]) * inverse_of(along);
-            if (along > 0.0f && t < i->leave) i->leave = t;
-            if (along < 0.0f && t > i->enter) i->enter = t;
-        }
-        return true;
-    default: return true;
-    }
-}
-
-/* Four numbers at once: a vector and one that means nothing. */
-typedef double double4 __attribute__((vector_size(32), aligned(8), may_alias));
-typedef float float4 __attribute__((vector_size(16), aligned(4), may_alias));
-typedef int32_t int4 __attribute__((vector_size(16)));
-
-/* Whether a primitive can have a root in (0, t_max) of the frame; with `any`, also whether it must. */
-static inline enum kernel_verdict filter(const pl_front_primitive *p, uint32_t kind, const pl_frame *f, float t_max,
-                                         bool any)
-{
-    if (kind == PL_KIND_MESH || kind == PL_SHAPE_PLANE) return CANDIDATE;
-    const float4 x = *(const float4 *)p->columns, y = *(const float4 *)(p->columns + 3);
-    const float4 z = *(const float4 *)(p->columns + 6), offset = *(const float4 *)(p->columns + 9);
-    const float4 at = x * f->origin[0] + y * f->origin[1] + (z * f->origin[2] + offset);
-    const float4 along = x * f->direction[0] + y * f->direction[1] + z * f->direction[2];
-    const float o[3] = {at[0], at[1], at[2]}, d[3] = {along[0], along[1], along[2]};
-    float margin = p->stretch * f->slack + 0x1p-19f;
-    interval i = {-1e30f, 1e30f};
-    if (!shape_interval(kind, p->argument, o, d, margin, &i)) return MISS;
-    if (i.enter > i.leave || i.enter > t_max || i.leave < 0.0f) return MISS;
-    if (!any || !(kind == PL_SHAPE_CYLINDER || kind == PL_SHAPE_SPHERE || kind == PL_SHAPE_BOX)) return CANDIDATE;
-    /* Outside the wider shape at first and later inside the narrower one: in between it passes the surface. Along its axis a
-     * cylinder's interval doesn't tell. */
-    interval deep = {-1e30f, 1e30f};
-    if (kind == PL_SHAPE_CYLINDER && !(d[0] * d[0] + d[1] * d[1] > 1e-30f)) return CANDIDATE;
-    if (!(i.enter > 0.0f && margin < 0.25f) || !shape_interval(kind, p->argument, o, d, -margin, &deep)) return CANDIDATE;
-    return deep.enter < deep.leave && deep.enter < t_max * 0.9999f ? CERTAIN : CANDIDATE;
-}
-
 /* --- entering an instance --- */
 
 static inline float4 absolute(float4 x)
@@ -137,21 +34,28 @@ static inline float4 absolute(float4 x)
     return (float4)((int4)x & INT32_MAX);
 }
 
-static inline float sum_of(float4 x)
+/* a0 b0 a1 b1; a2 b2 a3 b3; the second half twice. */
+#define LOW(a, b) __builtin_shuffle(a, b, (int4){0, 4, 1, 5})
+#define HIGH(a, b) __builtin_shuffle(a, b, (int4){2, 6, 3, 7})
+#define SECOND(a) __builtin_shuffle(a, (int4){2, 3, 2, 3})
+
+/* The sums of the sizes of a's first three numbers, and of b's, in the first two places. */
+static inline float4 sums_of(float4 a, float4 b)
 {
-    return x[0] + x[1] + x[2];
+    const int4 three = {INT32_MAX, INT32_MAX, INT32_MAX};
+    const float4 x = (float4)((int4)a & three), y = (float4)((int4)b & three), pairs = LOW(x, y) + HIGH(x, y);
+    return pairs + SECOND(pairs);
 }
 
-static inline float least_of(float4 x)
+/* The least of a's first three numbers, and of b's. */
+static inline float4 least_of(float4 a, float4 b)
 {
-    float least = x[0] < x[1] ? x[0] : x[1];
-    return x[2] < least ? x[2] : least;
-}
-
-static inline float greatest_of(float4 x)
-{
-    float greatest = x[0] > x[1] ? x[0] : x[1];
-    return x[2] > greatest ? x[2] : greatest;
+    const int4 three = {0, 1, 2, 7};
+    const float4 most = {0.0f, 0.0f, 0.0f, INFINITY};
+    a = __builtin_shuffle(a, most, three);
+    b = __builtin_shuffle(b, most, three);
+    const float4 pairs = four_min(LOW(a, b), HIGH(a, b));
+    return four_min(pairs, SECOND(pairs));
 }
 
 /* The power of two that brings x into [1, 2), where it and its inverse are normal numbers. */
@@ -172,15 +76,27 @@ static inline float local_t_max(const pl_frame *f, double t_max)
     return t < 1e30 ? (t > 0.0 ? (float)t + 1e-35f : 1e-35f) : 1e30f;
 }
 
+/* The ray in single precision, and what the loop needs at each node. */
+static inline void set_ray(pl_frame *f, float4 origin, float4 direction, float4 inverse)
+{
+    const int4 first = {0, PL_FRONT_WIDTH, 2 * PL_FRONT_WIDTH}, high = ((int4)direction >> 31) & 3 * PL_FRONT_WIDTH;
+    const float4 middle = origin * inverse, toward = f->slack * absolute(inverse);
+    *(float4 *)f->origin = origin;
+    *(float4 *)f->direction = direction;
+    *(float4 *)f->inverse = inverse;
+    *(float4 *)f->near_base = middle + toward;
+    *(float4 *)f->far_base = middle - toward;
+    *(int4 *)f->near_row = first + high;
+    *(int4 *)f->far_row = first + 3 * PL_FRONT_WIDTH - high;
+}
+
 /* A ray that can't be told in single precision meets everything. */
 static void go_blind(pl_frame *f)
 {
+    const float4 zero = {0};
     f->blind = true;
     f->slack = 1e30f;
-    for (int axis = 0; axis < 3; axis++) {
-        f->origin[axis] = f->direction[axis] = 0.0f;
-        f->inverse[axis] = 1.0f;
-    }
+    set_ray(f, zero, zero, zero + 1.0f);
 }
 
 /* Where the ray o + t·d is within a frame's box widened by the slack. A direction that hardly moves along an axis still gets
@@ -192,16 +108,14 @@ typedef struct span {
 
 static inline span box_span(const pl_front *front, float4 o, float4 d, float slack)
 {
-    const int4 sign = (int4)d & INT32_MIN;
-    const float4 size = absolute(d), least = {1e-18f, 1e-18f, 1e-18f, 1e-18f};
-    const int4 moves = size > least;
+    const float4 least = {1e-18f, 1e-18f, 1e-18f, 1e-18f};
     span s;
-    s.along = (float4)((((int4)size & moves) | ((int4)least & ~moves)) | sign);
+    s.along = (float4)((int4)four_max(absolute(d), least) | ((int4)d & INT32_MIN));
     s.inverse = 1.0f / s.along;
     const float4 middle = o * s.inverse, reach = (*(const float4 *)front->half + slack) * absolute(s.inverse);
-    s.enter = greatest_of(-middle - reach);
-    s.enter = s.enter > 0.0f ? s.enter : 0.0f;
-    s.leave = least_of(reach - middle);
+    const float4 ends = least_of(reach + middle, reach - middle);
+    s.enter = ends[0] < 0.0f ? -ends[0] : 0.0f;
+    s.leave = ends[1];
     return s;
 }
 
@@ -253,7 +167,8 @@ static inline __attribute__((always_inline)) bool begin_frame(pl_frame *f, doubl
                                                               float *local_max)
 {
     float4 at = __builtin_convertvector(o, float4), along = __builtin_convertvector(d, float4);
-    float far = sum_of(absolute(at)), size = sum_of(absolute(along));
+    const float4 sums = sums_of(at, along);
+    float far = sums[0], size = sums[1];
     *(double4 *)f->o = o;
     *(double4 *)f->d = d;
     f->mapped = f->blind = false;
@@ -266,19 +181,20 @@ static inline __attribute__((always_inline)) bool begin_frame(pl_frame *f, doubl
         }
         at = __builtin_convertvector(*(const double4 *)f->o, float4);
         along = __builtin_convertvector(*(const double4 *)f->d, float4);
-        far = sum_of(absolute(at));
+        far = sums_of(at, along)[0];
         *local_max = local_t_max(f, t_max);
     }
     f->slack = slack_of(f, far);
     const span s = box_span(f->front, at, along, f->slack);
-    *(float4 *)f->origin = at;
-    *(float4 *)f->direction = s.along;
-    *(float4 *)f->inverse = s.inverse;
-    const bool told = f->slack < 1e6f;
-    if (told && s.enter <= s.leave && s.enter <= *local_max && f->front->root != PL_NOTHING) return true;
+    const bool told = f->slack < 1e6f, filled = f->front->root != PL_NOTHING;
+    if (told && s.enter <= s.leave && s.enter <= *local_max && filled) {
+        set_ray(f, at, s.along, s.inverse);
+        return true;
+    }
+    if (told && !f->front->unbounded_count) return false;
     go_blind(f);
     *local_max = 1e30f;
-    return !told && f->front->root != PL_NOTHING;
+    return !told && filled;
 }
 
 /* Three of nine numbers; none beyond them is read. */
@@ -307,8 +223,8 @@ static inline __attribute__((always_inline)) void map_into(const pl_front_instan
     }
     *o = four_fma(a, from[0], four_fma(b, from[1], c * from[2]));
     *d = four_fma(a, parent->d[0], four_fma(b, parent->d[1], c * parent->d[2]));
-    const float stretch = bounds->stretch * __builtin_sqrtf(sum_of(x * x + y * y + z * z));
-    const float away = sum_of(absolute(__builtin_convertvector(centre, float4)));
+    const float4 sums = sums_of(x * x + y * y + z * z, __builtin_convertvector(centre, float4));
+    const float stretch = bounds->stretch * __builtin_sqrtf(sums[0]), away = sums[1];
     f->error = stretch * (parent->error + bounds->gain * parent->distance + bounds->base) + bounds->rough;
     f->distance = stretch * (parent->distance + away);
     f->t0 = parent->t0;
@@ -316,15 +232,15 @@ static inline __attribute__((always_inline)) void map_into(const pl_front_instan
 }
 
 /* Goes into an instance: frame `index` + 1. 0: it misses, 1: it meets the box, 2: only what is unbounded, -1: an error. */
-static inline int descend(pl_tracer *tracer, uint32_t index, uint32_t instance, const pl_query *query, float *local_max)
+static inline int descend(pl_tracer *tracer, pl_bvh_lane *lane, uint32_t index, uint32_t instance, const pl_query *query,
+                          float *local_max)
 {
-    pl_bvh_work *w = tracer->work;
     const pl_fronts *fronts = tracer->scene->structure;
-    if (index + 1 >= w->frame_capacity && !pl_bvh_grow_frames(w, index + 1, query->error)) return -1;
-    const pl_frame *parent = &w->frames[index];
+    if (index + 1 >= lane->frame_capacity && !pl_bvh_grow_frames(lane, index + 1, query->error)) return -1;
+    const pl_frame *parent = &lane->frames[index];
     const pl_front_instance *it = &parent->front->instances[instance];
     if (query->shadow && it->front & PL_NO_SHADOW) return 0;
-    pl_frame *f = &w->frames[index + 1];
+    pl_frame *f = &lane->frames[index + 1];
     double4 o, d;
     f->front = &fronts->list[it->front & ~PL_NO_SHADOW];
     f->instance = instance;
@@ -335,130 +251,218 @@ static inline int descend(pl_tracer *tracer, uint32_t index, uint32_t instance, 
     return f->front->unbounded_count ? 2 : 0;
 }
 
-/* --- the loop --- */
+/* --- candidates --- */
 
-/* What the loop keeps at hand of the frame it is in. base: (origin moved by the slack) / direction. */
-typedef struct near {
-    wide near_base[3], far_base[3], inverse[3];
-    uint32_t near_row[3], far_row[3]; /* offsets of planes, in floats */
-    float t_max;
-} near;
-
-static inline void look(near *n, const pl_frame *f)
+/* One step of the normative chain (pl_map_ray): the same operations in the same order. */
+static inline __attribute__((always_inline)) void map_step(const pl_transform *transform, double4 *o, double4 *d)
 {
-#pragma GCC unroll 3
-    for (int axis = 0; axis < 3; axis++) {
-        bool negative = f->direction[axis] < 0.0f;
-        float toward = f->slack * __builtin_fabsf(f->inverse[axis]), middle = f->origin[axis] * f->inverse[axis];
-        n->near_base[axis] = wide_set(middle + toward);
-        n->far_base[axis] = wide_set(middle - toward);
-        n->inverse[axis] = wide_set(f->inverse[axis]);
-        n->near_row[axis] = (uint32_t)(negative ? 3 + axis : axis) * PL_FRONT_WIDTH;
-        n->far_row[axis] = (uint32_t)(negative ? axis : 3 + axis) * PL_FRONT_WIDTH;
+    const double *m = transform->to_object.m;
+    const double4 offset = {m[3], m[7], m[11]};
+    if (transform->form == PL_FORM_GENERAL) {
+        const double4 x = {m[0], m[4], m[8]}, y = {m[1], m[5], m[9]}, z = {m[2], m[6], m[10]};
+        *o = x * (*o)[0] + y * (*o)[1] + z * (*o)[2] + offset;
+        *d = x * (*d)[0] + y * (*d)[1] + z * (*d)[2];
+    } else { /* a translation scales by 1 */
+        const double4 scale = {m[0], m[5], m[10]};
+        *o = *o * scale + offset;
+        *d = *d * scale;
     }
 }
 
-/* Writes the children of a node that the ray meets, the nearest last; returns their number. */
-static inline __attribute__((always_inline)) unsigned meet(const near *n, const pl_front_node *node, uint64_t *entries, pl_ref *nearest)
+/* Maps a ray from a front's state to an item of an opened node, one transformation after another. */
+static inline __attribute__((always_inline)) bool map_down(pl_bvh_work *w, const pl_front *front, uint32_t opened,
+                                                           const pl_item *item, double4 *o, double4 *d, pl_error *error)
+{
+    size_t count;
+    if (!pl_bvh_chain(w, front, opened, &count, error)) return false;
+    for (;;) {
+        const pl_item *at = count ? w->chain[count - 1] : item;
+        for (uint32_t i = 0; i < at->transform_count; i++) map_step(at->transforms[i], o, d);
+        if (!count--) return true;
+    }
+}
+
+/* Evaluates a primitive of a frame normatively and offers it. The normative ray comes from the deepest frame above that knows
+ * it. false: an error. */
+static bool evaluate(pl_tracer *tracer, pl_bvh_lane *lane, uint32_t frame, pl_ref ref, pl_query *query)
+{
+    const pl_states *states = &tracer->scene->states;
+    pl_bvh_work *w = tracer->work;
+    uint32_t from = frame;
+    while (!lane->frames[from].mapped) from--;
+    double4 o = *(const double4 *)lane->frames[from].normative_o, d = *(const double4 *)lane->frames[from].normative_d;
+    for (; from < frame; from++) {
+        const pl_front *front = lane->frames[from].front;
+        pl_frame *below = &lane->frames[from + 1];
+        const pl_front_place *at = &front->places[below->instance];
+        if (!map_down(w, front, at->opened, pl_front_item(states, at->item), &o, &d, query->error)) return false;
+        *(double4 *)below->normative_o = o;
+        *(double4 *)below->normative_d = d;
+        below->mapped = true;
+    }
+    const pl_front *front = lane->frames[frame].front;
+    const pl_front_primitive *p = &front->primitives[ref & PL_REF_INDEX];
+    const pl_item *item = pl_front_item(states, p->item);
+    double in_o[4], in_d[4];
+    if (!map_down(w, front, p->opened, item, &o, &d, query->error)) return false;
+    *(double4 *)in_o = o;
+    *(double4 *)in_d = d;
+    wide_end();
+    return pl_bvh_offer(tracer, lane, frame, ref, item, in_o, in_d, query);
+}
+
+/* --- the loop --- */
+
+/* Where the ray enters and leaves a node's children. */
+static inline __attribute__((always_inline)) void meet(const pl_frame *f, float t_max, const pl_front_node *node, wide *enter,
+                                                       wide *leave)
 {
     wide near_t[3], far_t[3];
 #pragma GCC unroll 3
     for (int axis = 0; axis < 3; axis++) {
-        near_t[axis] = wide_multiply_subtract(wide_load(node->planes[0] + n->near_row[axis]), n->inverse[axis],
-                                              n->near_base[axis]);
-        far_t[axis] = wide_multiply_subtract(wide_load(node->planes[0] + n->far_row[axis]), n->inverse[axis],
-                                             n->far_base[axis]);
+        const wide inverse = wide_set(f->inverse[axis]);
+        near_t[axis] = wide_multiply_subtract(wide_load(node->planes[0] + f->near_row[axis]), inverse,
+                                              wide_set(f->near_base[axis]));
+        far_t[axis] = wide_multiply_subtract(wide_load(node->planes[0] + f->far_row[axis]), inverse,
+                                             wide_set(f->far_base[axis]));
     }
-    wide enter = wide_max(wide_max(near_t[0], near_t[1]), wide_max(near_t[2], wide_set(0.0f)));
-    wide leave = wide_min(wide_min(far_t[0], far_t[1]), wide_min(far_t[2], wide_set(n->t_max)));
+    *enter = wide_max(wide_max(near_t[0], near_t[1]), wide_max(near_t[2], wide_set(0.0f)));
+    *leave = wide_min(wide_min(far_t[0], far_t[1]), wide_min(far_t[2], wide_set(t_max)));
+}
+
+/* Writes the children of a node that the ray meets, the nearest last (alone it isn't written); returns their number. */
+static inline __attribute__((always_inline)) unsigned meet_nearest(const pl_frame *f, float t_max, const pl_front_node *node,
+                                                                   uint64_t *entries, pl_ref *nearest)
+{
+    wide enter, leave;
+    meet(f, t_max, node, &enter, &leave);
     return wide_order(enter, leave, node->child, entries, nearest);
 }
 
-/* Pushes what a frame begins with, below it the way back. */
-static inline bool begin(pl_bvh_work *w, const pl_front *front, bool met, size_t *top, pl_error *error)
+/* A ray on its way. */
+typedef struct walk {
+    pl_bvh_lane *lane;
+    pl_query *query;
+    const pl_frame *f; /* frame `frame` of the lane, and its front's nodes */
+    const pl_front_node *nodes;
+    uint64_t *stack; /* the lane's */
+    uint64_t steps; /* but for nodes */
+    size_t top;
+    uint32_t frame, base; /* ends where `base` is left */
+    float t_max;       /* in the frame's own t */
+} walk;
+
+enum progress { FAILED = -1, ENDED, UNDER_WAY };
+
+static inline void look(walk *k, uint32_t frame, float t_max)
 {
-    w->stack[(*top)++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
-    for (uint32_t i = 0; i < front->unbounded_count; i++) {
-        if (*top + 16 > w->stack_capacity && !pl_bvh_grow_stack(w, *top, error)) return false;
-        w->stack[(*top)++] = entry_of(0.0f, front->unbounded[i]);
-    }
-    if (*top + 16 > w->stack_capacity && !pl_bvh_grow_stack(w, *top, error)) return false;
-    if (met) w->stack[(*top)++] = entry_of(0.0f, front->root);
+    k->frame = frame;
+    k->f = &k->lane->frames[frame]; /* frames may have moved */
+    k->nodes = k->f->front->nodes;
+    k->t_max = t_max;
+}
+
+/* Room for a node's entries. */
+static inline bool make_room(walk *k)
+{
+    if (__builtin_expect(k->top + 16 <= k->lane->stack_capacity, 1)) return true;
+    if (!pl_bvh_grow_stack(k->lane, k->top, k->query->error)) return false;
+    k->stack = k->lane->stack;
     return true;
 }
 
-/* From frame `base` on. met: its box; else only what is unbounded there counts. */
-static inline bool visit(pl_tracer *tracer, pl_query *query, uint32_t base, bool met, bool any)
+/* Pushes what the frame begins with, below it the way back. */
+static inline bool begin(walk *k, bool met)
 {
-    pl_bvh_work *w = tracer->work;
-    uint64_t *stack, steps = 0;
-    uint32_t frame = base;
-    const pl_frame *f = &w->frames[base];
-    size_t top = 0;
-    near n;
-    if (!begin(w, f->front, met, &top, query->error)) return false;
-    stack = w->stack;
-    look(&n, f);
-    n.t_max = local_t_max(f, query->t_max);
-    for (;;) {
-        uint64_t at = stack[--top];
+    const pl_front *front = k->f->front;
+    const uint32_t count = front->unbounded_count;
+    if (k->top + count + 16 > k->lane->stack_capacity && !pl_bvh_grow_stack(k->lane, k->top + count, k->query->error)) return false;
+    k->stack = k->lane->stack;
+    k->stack[k->top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
+    for (uint32_t i = 0; i < count; i++) k->stack[k->top++] = entry_of(0.0f, front->unbounded[i]);
+    if (met) k->stack[k->top++] = entry_of(0.0f, front->root);
+    return true;
+}
+
+/* From frame `base` on. met: its box; else only what is unbounded there counts. false: no memory. */
+static inline bool set_off(walk *k, pl_bvh_lane *lane, pl_query *query, uint32_t base, bool met)
+{
+    k->lane = lane;
+    k->query = query;
+    k->steps = 0;
+    k->top = 0;
+    k->base = base;
+    look(k, base, local_t_max(&lane->frames[base], query->t_max));
+    return begin(k, met);
+}
+
+/* Does what stands next on the stack where it isn't a node. */
+static inline __attribute__((always_inline)) enum progress take(pl_tracer *tracer, walk *k, pl_ref ref, bool any)
+{
+    pl_query *query = k->query;
+    const uint32_t kind = ref >> PL_REF_SHIFT;
+    if (kind == PL_KIND_RETURN) {
+        if (k->frame == k->base) return ENDED;
+        look(k, k->frame - 1, local_t_max(k->f - 1, query->t_max));
+        return UNDER_WAY;
+    }
+    if (kind == PL_KIND_INSTANCE) {
+        float t_max = k->t_max;
+        const int entered = descend(tracer, k->lane, k->frame, ref & PL_REF_INDEX, query, &t_max);
+        if (entered < 0) return FAILED;
+        if (entered == 0) t_max = k->t_max;
+        look(k, k->frame + (entered > 0), t_max);
+        if (entered == 0) return UNDER_WAY;
+        if (!begin(k, entered == 1)) return FAILED;
+    } else {
+        const pl_front_primitive *p = &k->f->front->primitives[ref & PL_REF_INDEX];
+        if (query->shadow && p->item & PL_NO_SHADOW) return UNDER_WAY;
+        tracer->counters.filtered++;
+        const enum kernel_verdict verdict = filter(p, kind, k->f, k->t_max, any);
+        if (verdict == MISS) return UNDER_WAY;
+        if (any && verdict == CERTAIN) {
+            query->found = query->done = true;
+            return ENDED;
+        }
+        if (!evaluate(tracer, k->lane, k->frame, ref, query)) return FAILED;
+        if (query->done) return ENDED;
+        k->t_max = local_t_max(k->f, query->t_max);
+    }
+    if (++k->steps > PL_LIMIT_RAY_STEPS) {
+        pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
+        return FAILED;
+    }
+    return UNDER_WAY;
+}
+
+/* One ray to its end. false: an error. */
+static inline bool visit(pl_tracer *tracer, walk *k, bool any)
+{
+    uint64_t nodes = 0;
+    enum progress progress = UNDER_WAY;
+    while (progress == UNDER_WAY) {
+        const uint64_t at = k->stack[--k->top];
         pl_ref ref = (pl_ref)at;
-        if (entry_is_beyond(at, n.t_max)) continue;
+        if (entry_is_beyond(at, k->t_max)) continue;
         while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
-            unsigned count = meet(&n, &f->front->nodes[ref], stack + top, &ref);
-            steps++;
+            unsigned count = meet_nearest(k->f, k->t_max, &k->nodes[ref], k->stack + k->top, &ref);
+            nodes++;
             if (count == 0) goto next;
-            top += count - 1;
-            if (top + 16 > w->stack_capacity) {
-                if (!pl_bvh_grow_stack(w, top, query->error)) return false;
-                stack = w->stack;
-            }
+            k->top += count - 1;
+            if (!make_room(k)) return false;
         }
-        uint32_t kind = ref >> PL_REF_SHIFT;
-        if (kind == PL_KIND_RETURN) {
-            if (frame == base) break;
-            f = &w->frames[--frame];
-            look(&n, f);
-            n.t_max = local_t_max(f, query->t_max);
-        } else if (kind == PL_KIND_INSTANCE) {
-            float t_max = n.t_max;
-            int entered = descend(tracer, frame, ref & PL_REF_INDEX, query, &t_max);
-            if (entered < 0) return false;
-            if (entered) frame++;
-            f = &w->frames[frame]; /* which may have moved */
-            if (!entered) continue;
-            n.t_max = t_max;
-            if (!begin(w, f->front, entered == 1, &top, query->error)) return false;
-            stack = w->stack;
-            look(&n, f);
-            if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
-        } else {
-            const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
-            if (query->shadow && p->item & PL_NO_SHADOW) continue;
-            tracer->counters.filtered++;
-            enum kernel_verdict verdict = filter(p, kind, f, n.t_max, any);
-            if (verdict == MISS) continue;
-            if (any && verdict == CERTAIN) {
-                query->found = query->done = true;
-                break;
-            }
-            wide_end();
-            if (!pl_bvh_candidate(tracer, frame, ref, query)) return false;
-            if (query->done) break;
-            n.t_max = local_t_max(f, query->t_max);
-            if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
-        }
+        progress = take(tracer, k, ref, any);
     next:;
     }
-    tracer->counters.box_tests += steps * PL_FRONT_WIDTH;
-    return true;
+    tracer->counters.box_tests += (nodes + k->steps) * PL_FRONT_WIDTH;
+    return progress == ENDED;
 }
 
-bool KERNEL(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
+/* Begins frame 0 with a ray. false: nothing is met. */
+static inline bool begin_root(pl_tracer *tracer, pl_bvh_lane *lane, const pl_ray *ray, const pl_query *query, bool *met)
 {
-    pl_bvh_work *w = tracer->work;
     const pl_fronts *fronts = tracer->scene->structure;
-    pl_frame *root = &w->frames[0];
+    pl_frame *root = &lane->frames[0];
     const pl_front *front = &fronts->list[0];
     const double4 origin = {ray->origin[0], ray->origin[1], ray->origin[2]};
     const double4 direction = {ray->direction[0], ray->direction[1], ray->direction[2]};
@@ -471,15 +475,22 @@ bool KERNEL(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     root->t0 = query->t_min;
     root->rate = 1.0;
     root->instance = 0;
-    bool met = begin_frame(root, from + query->t_min * d, d, query->t_max, &local_max);
-    if (!met && !root->front->unbounded_count) {
-        wide_end();
-        return true;
-    }
+    *met = begin_frame(root, from + query->t_min * d, d, query->t_max, &local_max);
     root->mapped = true;
-    memcpy(root->normative_o, ray->origin, sizeof root->normative_o);
-    memcpy(root->normative_d, ray->direction, sizeof root->normative_d);
-    bool ok = query->kind == PL_QUERY_ANY ? visit(tracer, query, 0, met, true) : visit(tracer, query, 0, met, false);
+    *(double4 *)root->normative_o = origin;
+    *(double4 *)root->normative_d = direction;
+    return *met || front->unbounded_count;
+}
+
+bool KERNEL(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
+{
+    pl_bvh_work *w = tracer->work;
+    bool met, ok = true;
+    if (begin_root(tracer, w->lanes, ray, query, &met)) {
+        walk k;
+        ok = set_off(&k, w->lanes, query, 0, met) &&
+             (query->kind == PL_QUERY_ANY ? visit(tracer, &k, true) : visit(tracer, &k, false));
+    }
     wide_end();
     return ok;
 }

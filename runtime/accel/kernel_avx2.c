@@ -5,6 +5,7 @@
 #include "bvh.h"
 
 #define KERNEL pl_bvh_trace_avx2
+#define STREAM_KERNEL pl_bvh_stream_avx2
 #define TERRAIN_KERNEL pl_terrain_trace_avx2
 #define TERRAIN_PACKET pl_terrain_packet_avx2
 #define PACKET_KERNEL pl_bvh_packet_avx2
@@ -13,6 +14,7 @@
 #include "kernel_vector.h"
 
 #include "kernel.h"
+#include "kernel_stream.h"
 #include "kernel_packet.h"
 #include "gated_kernel.h"
 #include "terrain_kernel.h"

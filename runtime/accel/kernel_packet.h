@@ -227,7 +227,7 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
         const int lane = __builtin_ctz(lanes);
         const double o[3] = {rays.o[0][lane], rays.o[1][lane], rays.o[2][lane]};
         const double d[3] = {rays.d[0][lane], rays.d[1][lane], rays.d[2][lane]};
-        if (!pl_bvh_offer(tracer, index, ref, item, o, d, &queries[lane])) return false;
+        if (!pl_bvh_offer(tracer, w->lanes, index, ref, item, o, d, &queries[lane])) return false;
         t_max[lane] = queries[lane].t_max;
     }
     return true;
@@ -253,9 +253,9 @@ static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, 
     const pl_packet_frame *from = &w->packets[index];
     for (; lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
-        pl_frame *f = &w->frames[index];
+        pl_frame *f = &w->lanes->frames[index];
         float local_max = 1e30f;
-        for (uint32_t i = 0; i <= index; i++) w->frames[i].mapped = false;
+        for (uint32_t i = 0; i <= index; i++) w->lanes->frames[i].mapped = false;
         f->front = from->front;
         f->error = from->error;
         f->distance = from->distance;
@@ -267,12 +267,13 @@ static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, 
         local_max = local_t_max(f, t_max[lane]);
         bool met = begin_frame(f, o, d, t_max[lane], &local_max);
         if (!met && !f->front->unbounded_count) continue;
-        w->frames[0].mapped = true;
+        w->lanes->frames[0].mapped = true;
         for (int axis = 0; axis < 3; axis++) {
-            w->frames[0].normative_o[axis] = w->packets[0].normative.o[axis][lane];
-            w->frames[0].normative_d[axis] = w->packets[0].normative.d[axis][lane];
+            w->lanes->frames[0].normative_o[axis] = w->packets[0].normative.o[axis][lane];
+            w->lanes->frames[0].normative_d[axis] = w->packets[0].normative.d[axis][lane];
         }
-        if (any ? !visit(tracer, &queries[lane], index, met, true) : !visit(tracer, &queries[lane], index, met, false))
+        walk k;
+        if (!set_off(&k, w->lanes, &queries[lane], index, met) || !(any ? visit(tracer, &k, true) : visit(tracer, &k, false)))
             return false;
         t_max[lane] = queries[lane].t_max;
     }
@@ -396,8 +397,8 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
             f = &w->packets[index];
             pl_packet_frame *inner = f + 1;
             inner->front = &fronts->list[it->front & ~PL_NO_SHADOW];
-            inner->instance = w->frames[index + 1].instance = instance;
-            w->frames[index + 1].front = inner->front;
+            inner->instance = w->lanes->frames[index + 1].instance = instance;
+            w->lanes->frames[index + 1].front = inner->front;
             tracer->counters.instances++;
             descend_lanes(inner, f, it);
             if (!enter_lanes(tracer, index + 1, f->lanes, queries, t_max, any, &b, &beams)) return false;
@@ -466,8 +467,8 @@ bool PACKET_KERNEL(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, uns
     double t_max[PL_LANES];
     if (!pl_bvh_grow_packets(w, 0, queries->error) || !pl_bvh_grow_packet_stack(w, 0, queries->error)) return false;
     load_rays(&w->packets[0], ((const pl_fronts *)tracer->scene->structure)->list, rays, queries, count, t_max);
-    w->frames[0].front = w->packets[0].front;
-    w->frames[0].instance = 0;
+    w->lanes->frames[0].front = w->packets[0].front;
+    w->lanes->frames[0].instance = 0;
     const unsigned lanes = (1u << count) - 1;
     const bool ok = queries->kind == PL_QUERY_ANY ? visit_packet(tracer, lanes, queries, t_max, true)
                                                   : visit_packet(tracer, lanes, queries, t_max, false);

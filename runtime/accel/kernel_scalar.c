@@ -7,11 +7,23 @@
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 #define KERNEL pl_bvh_trace_scalar
+#define STREAM_KERNEL pl_bvh_stream_scalar
 #define TERRAIN_KERNEL pl_terrain_trace_scalar
 #define GATED_KERNEL pl_gated_trace_scalar
 
 #define wide_end() ((void)0)
 #define four_fma(a, b, c) ((a) * (b) + (c))
+
+#define four_min(a, b) four_least(a, b)
+#define four_max(a, b) (-four_least(-(a), -(b)))
+
+typedef float four __attribute__((vector_size(16), aligned(4), may_alias));
+
+static inline four four_least(four a, four b)
+{
+    for (int i = 0; i < 4; i++) a[i] = a[i] < b[i] ? a[i] : b[i];
+    return a;
+}
 
 typedef struct wide {
     float at[8];
@@ -64,7 +76,7 @@ static inline wide wide_min(wide a, wide b)
 }
 
 /* Entries of the children whose enter <= leave, the nearest last; their number. */
-static inline unsigned wide_order(wide enter, wide leave, const pl_ref *child, uint64_t *entries, pl_ref *nearest)
+static inline unsigned wide_list(wide enter, wide leave, const pl_ref *child, uint64_t *entries)
 {
     unsigned count = 0;
     for (int i = 0; i < 8; i++) {
@@ -76,10 +88,17 @@ static inline unsigned wide_order(wide enter, wide leave, const pl_ref *child, u
         for (; place > 0 && entries[place - 1] < entry; place--) entries[place] = entries[place - 1];
         entries[place] = entry;
     }
+    return count;
+}
+
+static inline unsigned wide_order(wide enter, wide leave, const pl_ref *child, uint64_t *entries, pl_ref *nearest)
+{
+    const unsigned count = wide_list(enter, leave, child, entries);
     if (count) *nearest = (pl_ref)entries[count - 1];
     return count;
 }
 
 #include "kernel.h"
+#include "kernel_stream.h"
 #include "gated_kernel.h"
 #include "terrain_kernel.h"

@@ -10,6 +10,8 @@ typedef __m256 wide;
 #define wide_multiply_add(a, b, c) _mm256_fmadd_ps(a, b, c)
 #define wide_max(a, b) _mm256_max_ps(a, b) /* the second where the first is NaN */
 #define wide_min(a, b) _mm256_min_ps(a, b)
+#define four_min(a, b) ((float4)_mm_min_ps((__m128)(a), (__m128)(b)))
+#define four_max(a, b) ((float4)_mm_max_ps((__m128)(a), (__m128)(b)))
 #define four_fma(a, b, c) ((double4)_mm256_fmadd_pd((__m256d)(a), _mm256_set1_pd(b), (__m256d)(c)))
 /* Code of other instruction sets that follows would wait for the upper halves of registers; compilers forget this where
  * vectors are arguments. */
@@ -30,24 +32,35 @@ static inline __m256i wide_sort(__m256i v)
     return EXCHANGE(v, _mm256_permutevar8x32_epi32(v, _mm256_setr_epi32(0, 2, 1, 4, 3, 6, 5, 7)), 0x54);
 }
 
-/* Entries of the children whose enter <= leave, the nearest last; their number. Writes all eight places. *nearest is found
- * by itself, so that the next node needn't wait for the sorting. */
+/* Lane numbers below enter's bits. */
+static inline __m256i wide_keys(wide enter)
+{
+    const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    return _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(enter)), lanes);
+}
+
+/* Entries of the children whose enter <= leave, the nearest last; their number. Writes all eight places. No branches. */
+static inline __attribute__((always_inline)) unsigned wide_list(wide enter, wide leave, const pl_ref *child, uint64_t *entries)
+{
+    const __m256i hit = _mm256_castps_si256(_mm256_cmp_ps(enter, leave, _CMP_LE_OQ));
+    const __m256i sorted = wide_sort(_mm256_or_si256(wide_keys(enter), _mm256_xor_si256(hit, _mm256_set1_epi32(-1))));
+    const __m256i refs = _mm256_permutevar8x32_epi32(_mm256_loadu_si256((const __m256i *)child), sorted);
+    const __m256i low = _mm256_unpacklo_epi32(refs, sorted), high = _mm256_unpackhi_epi32(refs, sorted);
+    _mm256_storeu_si256((__m256i *)entries, _mm256_permute2x128_si256(low, high, 0x20));
+    _mm256_storeu_si256((__m256i *)(entries + 4), _mm256_permute2x128_si256(low, high, 0x31));
+    return (unsigned)__builtin_popcount((unsigned)_mm256_movemask_ps(_mm256_castsi256_ps(hit)));
+}
+
+/* The same, but one alone isn't written. *nearest is found by itself, so that the next node needn't wait for the sorting. */
 static inline unsigned wide_order(wide enter, wide leave, const pl_ref *child, uint64_t *entries, pl_ref *nearest)
 {
     const __m256i hit = _mm256_castps_si256(_mm256_cmp_ps(enter, leave, _CMP_LE_OQ));
     const unsigned mask = (unsigned)_mm256_movemask_ps(_mm256_castsi256_ps(hit));
-    const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-    const __m256i keys = _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(enter)), lanes);
-    const __m256i least = _mm256_or_si256(keys, _mm256_andnot_si256(hit, _mm256_set1_epi32(INT32_MAX)));
+    const __m256i least = _mm256_or_si256(wide_keys(enter), _mm256_andnot_si256(hit, _mm256_set1_epi32(INT32_MAX)));
     __m128i least4 = _mm_min_epi32(_mm256_castsi256_si128(least), _mm256_extracti128_si256(least, 1));
     least4 = _mm_min_epi32(least4, _mm_shuffle_epi32(least4, 0x4E));
     least4 = _mm_min_epi32(least4, _mm_shuffle_epi32(least4, 0xB1));
     *nearest = child[_mm_cvtsi128_si32(least4) & 7];
     if ((mask & (mask - 1)) == 0) return mask != 0;
-    const __m256i sorted = wide_sort(_mm256_or_si256(keys, _mm256_xor_si256(hit, _mm256_set1_epi32(-1))));
-    const __m256i refs = _mm256_permutevar8x32_epi32(_mm256_loadu_si256((const __m256i *)child), sorted);
-    const __m256i low = _mm256_unpacklo_epi32(refs, sorted), high = _mm256_unpackhi_epi32(refs, sorted);
-    _mm256_storeu_si256((__m256i *)entries, _mm256_permute2x128_si256(low, high, 0x20));
-    _mm256_storeu_si256((__m256i *)(entries + 4), _mm256_permute2x128_si256(low, high, 0x31));
-    return (unsigned)__builtin_popcount(mask);
+    return wide_list(enter, leave, child, entries);
 }

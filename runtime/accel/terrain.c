@@ -142,19 +142,21 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     return !terrains->fronts || query->done || pl_accel_bvh.trace(tracer, ray, query);
 }
 
-/* Those that don't go well together gain as well: they needn't wait for memory one after another. */
-static bool is_packet(const pl_tracer *tracer, const pl_ray *rays, unsigned count)
+static bool trace_one_by_one(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
 {
-    (void)rays;
-    return tracer->scene->isa != PL_ISA_SCALAR && count >= PL_LEAST_LANES;
+    for (unsigned k = 0; k < count; k++)
+        if (!trace(tracer, &rays[k], &queries[k])) return false;
+    return true;
 }
 
-static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
+/* Those that don't go well together gain as well: they needn't wait for memory one after another. */
+static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
 {
 #ifdef __x86_64__
     const pl_terrains *terrains = tracer->scene->terrains;
     pl_terrain_packet *kernel = tracer->scene->isa == PL_ISA_AVX512 ? pl_terrain_packet_avx512 : pl_terrain_packet_avx2;
     pl_ray mapped[PL_LANES];
+    if (tracer->scene->isa == PL_ISA_SCALAR || count < PL_LEAST_LANES) return trace_one_by_one(tracer, rays, queries, count);
     for (unsigned k = 0; k < count; k++)
         if (!trace_singles(tracer, terrains, &rays[k], &queries[k])) return false;
     for (uint32_t i = 0; i < terrains->count; i++) {
@@ -163,14 +165,9 @@ static bool trace_packet(pl_tracer *tracer, const pl_ray *rays, pl_query *querie
         for (unsigned k = 0; k < count; k++) map_to_place(&terrain->place, &rays[k], mapped[k].origin, mapped[k].direction);
         if (!kernel(tracer, terrain, mapped, queries, count)) return false;
     }
-    if (!terrains->fronts) return true;
-    if (pl_accel_bvh.is_packet(tracer, rays, count)) return pl_accel_bvh.trace_packet(tracer, rays, queries, count);
-    for (unsigned k = 0; k < count; k++)
-        if (!pl_accel_bvh.trace(tracer, &rays[k], &queries[k])) return false;
-    return true;
+    return !terrains->fronts || pl_accel_bvh.trace_many(tracer, rays, queries, count);
 #else
-    (void)tracer, (void)rays, (void)queries, (void)count;
-    return false;
+    return trace_one_by_one(tracer, rays, queries, count);
 #endif
 }
 
@@ -228,8 +225,7 @@ const pl_accel pl_accel_terrain = {.name = "bvh",
                                    .work_create = work_create,
                                    .work_destroy = work_destroy,
                                    .trace = trace,
-                                   .is_packet = is_packet,
-                                   .trace_packet = trace_packet,
+                                   .trace_many = trace_many,
                                    .items = trail_items,
                                    .path = trail_path,
                                    .skip = skip};

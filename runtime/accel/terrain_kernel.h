@@ -163,26 +163,26 @@ typedef struct traveller {
     float inverse_square; /* of the frame's direction */
     uint64_t *stack;      /* of terrain->stack_need entries */
     size_t top;
-    near n;
+    float t_max; /* in the frame's own t */
 } traveller;
 
 static const pl_ref CLUSTERS[PL_FRONT_WIDTH] = {0, 1, 2, 3, 4, 5, 6, 7};
 
 /* Writes the clusters of a tile that the ray meets, the nearest last; returns their number. */
-static inline unsigned meet_tile(const near *n, const pl_terrain_tile *tile, uint64_t *entries, uint32_t *nearest)
+static inline unsigned meet_tile(const pl_frame *f, float t_max, const pl_terrain_tile *tile, uint64_t *entries, uint32_t *nearest)
 {
     wide near_t[3], far_t[3];
 #pragma GCC unroll 3
     for (int axis = 0; axis < 3; axis++) {
-        const wide lo = wide_set(tile->lo[axis]);
-        const wide step = wide_multiply_subtract(wide_set(tile->step[axis]), n->inverse[axis], wide_set(0.0f));
-        near_t[axis] = wide_multiply_add(wide_bytes(tile->planes[0] + n->near_row[axis]), step,
-                                         wide_multiply_subtract(lo, n->inverse[axis], n->near_base[axis]));
-        far_t[axis] = wide_multiply_add(wide_bytes(tile->planes[0] + n->far_row[axis]), step,
-                                        wide_multiply_subtract(lo, n->inverse[axis], n->far_base[axis]));
+        const wide lo = wide_set(tile->lo[axis]), inverse = wide_set(f->inverse[axis]);
+        const wide step = wide_multiply_subtract(wide_set(tile->step[axis]), inverse, wide_set(0.0f));
+        near_t[axis] = wide_multiply_add(wide_bytes(tile->planes[0] + f->near_row[axis]), step,
+                                         wide_multiply_subtract(lo, inverse, wide_set(f->near_base[axis])));
+        far_t[axis] = wide_multiply_add(wide_bytes(tile->planes[0] + f->far_row[axis]), step,
+                                        wide_multiply_subtract(lo, inverse, wide_set(f->far_base[axis])));
     }
     wide enter = wide_max(wide_max(near_t[0], near_t[1]), wide_max(near_t[2], wide_set(0.0f)));
-    wide leave = wide_min(wide_min(far_t[0], far_t[1]), wide_min(far_t[2], wide_set(n->t_max)));
+    wide leave = wide_min(wide_min(far_t[0], far_t[1]), wide_min(far_t[2], wide_set(t_max)));
     return wide_order(enter, leave, CLUSTERS, entries, nearest);
 }
 
@@ -196,7 +196,7 @@ static inline int visit_cluster(pl_tracer *tracer, const traveller *r, const sig
     unpack_cluster(pl_terrain_tile_at(r->terrain, tile), cluster, slack, &f);
     tracer->counters.filtered += PL_TERRAIN_CLUSTER;
     const unsigned there = left;
-    left &= filter_eight(s, &f, r->n.t_max, any, &certain);
+    left &= filter_eight(s, &f, r->t_max, any, &certain);
     if (any && certain & there) {
         r->query->found = r->query->done = true;
         return 1;
@@ -217,7 +217,7 @@ static inline int visit_tile(pl_tracer *tracer, traveller *r, pl_ref ref, bool a
     const pl_terrain_tile *tile = pl_terrain_tile_at(r->terrain, index);
     uint64_t entries[PL_TERRAIN_CLUSTERS];
     uint32_t cluster;
-    unsigned count = meet_tile(&r->n, tile, entries, &cluster);
+    unsigned count = meet_tile(r->frame, r->t_max, tile, entries, &cluster);
     if (count == 0) return 0;
     float steps[3], slack[3];
     for (int axis = 0; axis < 3; axis++) {
@@ -228,8 +228,8 @@ static inline int visit_tile(pl_tracer *tracer, traveller *r, pl_ref ref, bool a
     for (;;) {
         int done = visit_cluster(tracer, r, &s, slack, index, cluster, any);
         if (done) return done;
-        r->n.t_max = local_t_max(r->frame, r->query->t_max);
-        if (--count == 0 || entry_is_beyond(entries[count - 1], r->n.t_max)) return 0;
+        r->t_max = local_t_max(r->frame, r->query->t_max);
+        if (--count == 0 || entry_is_beyond(entries[count - 1], r->t_max)) return 0;
         cluster = (uint32_t)entries[count - 1];
     }
 }
@@ -244,9 +244,9 @@ static inline pl_ref next_tile(traveller *r, uint64_t *steps)
     while (top) {
         const uint64_t entry = stack[--top];
         pl_ref ref = (pl_ref)entry;
-        if (entry_is_beyond(entry, r->n.t_max)) continue;
+        if (entry_is_beyond(entry, r->t_max)) continue;
         while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
-            const unsigned count = meet(&r->n, &nodes[ref], stack + top, &ref);
+            const unsigned count = meet_nearest(r->frame, r->t_max, &nodes[ref], stack + top, &ref);
             taken++;
             if (count == 0) goto next;
             top += count - 1;
@@ -284,8 +284,7 @@ static inline bool set_out(traveller *r, const pl_terrain *terrain, pl_frame *f,
     if (!begin_frame(f, from + query->t_min * along, along, query->t_max, &local_max)) return false;
     const float *v = f->direction;
     r->inverse_square = 1.0f / (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    look(&r->n, f);
-    r->n.t_max = local_t_max(f, query->t_max);
+    r->t_max = local_t_max(f, query->t_max);
     stack[0] = entry_of(0.0f, front->root);
     r->top = 1;
     return true;
@@ -306,10 +305,11 @@ static inline bool travel(pl_tracer *tracer, traveller *r, bool any)
 bool TERRAIN_KERNEL(pl_tracer *tracer, const pl_terrain *terrain, const double o[3], const double d[3], pl_query *query)
 {
     pl_bvh_work *w = tracer->work;
-    if (w->stack_capacity < terrain->stack_need && !pl_bvh_grow_stack(w, terrain->stack_need, query->error)) return false;
+    pl_bvh_lane *lane = w->lanes;
+    if (lane->stack_capacity < terrain->stack_need && !pl_bvh_grow_stack(lane, terrain->stack_need, query->error)) return false;
     traveller r;
     bool ok = true;
-    if (set_out(&r, terrain, w->frames, o, d, query, w->stack)) ok = query->kind == PL_QUERY_ANY ? travel(tracer, &r, true) : travel(tracer, &r, false);
+    if (set_out(&r, terrain, lane->frames, o, d, query, lane->stack)) ok = query->kind == PL_QUERY_ANY ? travel(tracer, &r, true) : travel(tracer, &r, false);
     wide_end();
     return ok;
 }
