@@ -36,8 +36,8 @@ static inline float inverse_of(float d)
 }
 
 /* What of the ray o + t·d is within `grow` of a unit shape; false: nothing. grow < 0 gives what lies as deep inside. */
-static inline bool shape_interval(uint32_t kind, float argument, const float o[3], const float d[3], float grow,
-                                  interval *i)
+static inline __attribute__((always_inline)) bool shape_interval(uint32_t kind, float argument, const float o[3],
+                                                                 const float d[3], float grow, interval *i)
 {
     switch (kind) {
     case PL_SHAPE_SPHERE: {
