@@ -86,17 +86,9 @@ static const pl_item *instance_item(const pl_scene *scene, const pl_front *front
     return pl_front_item(&scene->states, front->places[instance].item);
 }
 
-/* A leaf's place: frames 1 … frame, then a primitive. */
-typedef struct place {
-    const pl_scene *scene;
-    const pl_bvh_lane *lane;
-    uint32_t frame;
-    pl_ref ref;
-} place;
-
 static bool write_trail(const void *source, pl_path *trail)
 {
-    const place *p = source;
+    const pl_bvh_place *p = source;
     while (trail->capacity <= p->frame)
         if (!pl_path_push(trail, trail->capacity, 0)) return false;
     for (uint32_t i = 0; i < p->frame; i++) trail->terms[i] = p->lane->frames[i + 1].instance;
@@ -105,19 +97,24 @@ static bool write_trail(const void *source, pl_path *trail)
     return true;
 }
 
+pl_leaf pl_bvh_leaf(const pl_scene *scene, const pl_item *item, const pl_bvh_place *place)
+{
+    return (pl_leaf){
+        .shape = item->what,
+        .arguments = item->arguments,
+        .mesh = item->kind == PL_NODE_MESH ? scene->meshes[item->what] : NULL,
+        .trail = write_trail,
+        .source = place,
+    };
+}
+
 bool pl_bvh_offer(pl_tracer *tracer, const pl_bvh_lane *lane, uint32_t frame, pl_ref ref, const pl_item *item,
                   const double o[3], const double d[3], pl_query *query)
 {
-    place p = {tracer->scene, lane, frame, ref};
-    pl_leaf leaf = {
-        .shape = item->what,
-        .arguments = item->arguments,
-        .mesh = item->kind == PL_NODE_MESH ? tracer->scene->meshes[item->what] : NULL,
-        .trail = write_trail,
-        .source = &p,
-        .o = o,
-        .d = d,
-    };
+    const pl_bvh_place place = {lane, frame, ref};
+    pl_leaf leaf = pl_bvh_leaf(tracer->scene, item, &place);
+    leaf.o = o;
+    leaf.d = d;
     tracer->counters.primitive_tests++;
     return pl_query_leaf(query, &leaf);
 }

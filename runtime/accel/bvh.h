@@ -75,6 +75,16 @@ extern pl_bvh_many_kernel pl_bvh_packet_avx2, pl_bvh_packet_avx512;
  * of what is traced; scale: 1 / half of it. */
 bool pl_bvh_are_alike(const pl_ray *rays, unsigned count, double scale);
 
+/* Where a leaf is: frames 1 … frame of a lane, then a primitive. */
+typedef struct pl_bvh_place {
+    const pl_bvh_lane *lane;
+    uint32_t frame;
+    pl_ref ref;
+} pl_bvh_place;
+
+/* A primitive's leaf, but for the ray; place is kept. */
+pl_leaf pl_bvh_leaf(const pl_scene *scene, const pl_item *item, const pl_bvh_place *place);
+
 /* Offers a primitive of a frame with the normative ray in the primitive's own frame. */
 bool pl_bvh_offer(pl_tracer *tracer, const pl_bvh_lane *lane, uint32_t frame, pl_ref ref, const pl_item *item,
                   const double o[3], const double d[3], pl_query *query);

@@ -1,5 +1,4 @@
-/* kernel_lanes.h - primitives against eight rays at a time, and transformations of four: the filters of kernel.h and the
- * normative map (accel.h), wider, for kernel_packet.h. */
+/* kernel_lanes.h - primitives against eight rays at a time: the filters of kernel.h, wider, for kernel_packet.h. */
 
 enum { HALF = 8, QUADS = PL_LANES / 4 };
 
@@ -149,44 +148,4 @@ static inline unsigned filter_lanes(const pl_front_primitive *p, uint32_t kind, 
     }
     if (certain) *certain &= lanes;
     return found & lanes;
-}
-
-/* pl_map_ray for the rays of some quads, the same operations. */
-static inline void map_lanes(const pl_transform *transform, pl_lanes *rays, unsigned quads)
-{
-    const double *m = transform->to_object.m;
-    for (int i = 0; i < PL_LANES; i += 4) {
-        if (!(quads >> i / 4 & 1)) continue;
-        double4 *o[3], *d[3];
-        for (int axis = 0; axis < 3; axis++) {
-            o[axis] = (double4 *)(rays->o[axis] + i);
-            d[axis] = (double4 *)(rays->d[axis] + i);
-        }
-        if (transform->form == PL_FORM_GENERAL) {
-            const double4 x = *o[0], y = *o[1], z = *o[2], u = *d[0], v = *d[1], w = *d[2];
-            for (int r = 0; r < 3; r++) {
-                *o[r] = m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3];
-                *d[r] = m[4 * r] * u + m[4 * r + 1] * v + m[4 * r + 2] * w;
-            }
-            continue;
-        }
-        for (int axis = 0; axis < 3; axis++) {
-            if (transform->form == PL_FORM_DIAGONAL) {
-                *o[axis] *= m[5 * axis];
-                *d[axis] *= m[5 * axis];
-            }
-            *o[axis] += m[4 * axis + 3];
-        }
-    }
-}
-
-static inline void copy_quads(pl_lanes *to, const pl_lanes *from, unsigned quads)
-{
-    for (int i = 0; i < PL_LANES; i += 4) {
-        if (!(quads >> i / 4 & 1)) continue;
-        for (int axis = 0; axis < 3; axis++) {
-            *(double4 *)(to->o[axis] + i) = *(const double4 *)(from->o[axis] + i);
-            *(double4 *)(to->d[axis] + i) = *(const double4 *)(from->d[axis] + i);
-        }
-    }
 }

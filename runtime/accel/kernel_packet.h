@@ -10,6 +10,7 @@
  * can't show in hits. */
 
 #include "kernel_lanes.h"
+#include "kernel_offer.h"
 
 /* As wide as this in the front's unit frame, rays are soon among different items. */
 #define WIDE 0.5f
@@ -172,65 +173,6 @@ static inline unsigned meet_beam(const beam *b, float t_max, const pl_front_node
         leave = wide_min(wide_max(far * b->least[axis], far * b->most[axis]), leave);
     }
     return wide_order(enter, leave, node->child, entries, nearest);
-}
-
-/* --- candidates --- */
-
-static inline bool map_lanes_down(pl_bvh_work *w, const pl_front *front, uint32_t opened, const pl_item *item,
-                                  pl_lanes *rays, unsigned quads, pl_error *error)
-{
-    size_t count;
-    if (!pl_bvh_chain(w, front, opened, &count, error)) return false;
-    while (count > 0) {
-        const pl_item *at = w->chain[--count];
-        for (uint32_t i = 0; i < at->transform_count; i++) map_lanes(at->transforms[i], rays, quads);
-    }
-    for (uint32_t i = 0; i < item->transform_count; i++) map_lanes(item->transforms[i], rays, quads);
-    return true;
-}
-
-/* The normative rays of some quads of a frame. */
-static bool map_packet(const pl_scene *scene, pl_bvh_work *w, uint32_t index, unsigned quads, pl_error *error)
-{
-    uint32_t from = index;
-    while (quads & ~w->packets[from].mapped) from--;
-    for (; from < index; from++) {
-        const pl_packet_frame *parent = &w->packets[from];
-        pl_packet_frame *f = &w->packets[from + 1];
-        const pl_front_place *it = &parent->front->places[f->instance];
-        copy_quads(&f->normative, &parent->normative, quads);
-        /* Quads that were mapped before are mapped again to the same numbers. */
-        if (!map_lanes_down(w, parent->front, it->opened,
-                            pl_front_item(&scene->states, it->item), &f->normative, quads, error))
-            return false;
-        f->mapped |= quads;
-    }
-    return true;
-}
-
-/* Evaluates a primitive of frame `index` for some lanes and offers it to their queries. */
-static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned lanes, pl_query *queries, double *t_max)
-{
-    pl_bvh_work *w = tracer->work;
-    const pl_scene *scene = tracer->scene;
-    const pl_front *front = w->packets[index].front;
-    const pl_front_primitive *p = &front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = pl_front_item(&scene->states, p->item);
-    unsigned quads = 0;
-    for (int i = 0; i < QUADS; i++) quads |= (unsigned)((lanes >> 4 * i & 15) != 0) << i;
-    if (!map_packet(scene, w, index, quads, queries->error)) return false;
-    pl_lanes rays;
-    copy_quads(&rays, &w->packets[index].normative, quads);
-    if (!map_lanes_down(w, front, p->opened, item, &rays, quads, queries->error)) return false;
-    wide_end();
-    for (; lanes; lanes &= lanes - 1) {
-        const int lane = __builtin_ctz(lanes);
-        const double o[3] = {rays.o[0][lane], rays.o[1][lane], rays.o[2][lane]};
-        const double d[3] = {rays.d[0][lane], rays.d[1][lane], rays.d[2][lane]};
-        if (!pl_bvh_offer(tracer, w->lanes, index, ref, item, o, d, &queries[lane])) return false;
-        t_max[lane] = queries[lane].t_max;
-    }
-    return true;
 }
 
 /* Those of some lanes whose queries want more. */
