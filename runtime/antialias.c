@@ -21,6 +21,7 @@ struct pl_sampler {
     pl_shader *shader;
     const pl_render_options *options;
     int left, top;
+    bool empty;         /* no ray through the tile meets anything */
     int steps;          /* of the adaptive method's finest grid, a pixel's side; a power of two */
     pl_sample *corners; /* of the tile's pixels: (PL_TILE + 1)² */
     pl_sample *inner;   /* of the pixel: (steps + 1)², without its corners */
@@ -73,17 +74,27 @@ void pl_sampler_destroy(pl_sampler *sampler)
     free(sampler);
 }
 
+static void direction_at(const pl_sampler *sampler, double x, double y, double direction[3])
+{
+    const pl_view *view = pl_shader_view(sampler->shader);
+    pl_camera_direction(&view->camera, x, y, sampler->options->width, sampler->options->height, direction);
+}
+
+/* The pyramid through the tile's corners has all rays of its pixels, half a pixel inside. */
+static bool is_empty(const pl_sampler *sampler)
+{
+    double corners[4][3];
+    for (int i = 0; i < 4; i++)
+        direction_at(sampler, sampler->left + (i == 1 || i == 2) * PL_TILE, sampler->top + (i >= 2) * PL_TILE, corners[i]);
+    return pl_shade_misses(sampler->shader, corners);
+}
+
 void pl_sampler_begin_tile(pl_sampler *sampler, int left, int top)
 {
     sampler->left = left;
     sampler->top = top;
     sampler->tile_stamp++;
-}
-
-static void direction_at(const pl_sampler *sampler, double x, double y, double direction[3])
-{
-    const pl_view *view = pl_shader_view(sampler->shader);
-    pl_camera_direction(&view->camera, x, y, sampler->options->width, sampler->options->height, direction);
+    sampler->empty = sampler->options->antialias == PL_AA_OFF && is_empty(sampler);
 }
 
 /* --- grid: the mean of the centre and of samples² cells' centres --- */
@@ -238,6 +249,10 @@ bool pl_sampler_block(pl_sampler *sampler, int x, int y, int columns, int rows, 
 {
     double directions[PL_BLOCK * PL_BLOCK][3];
     const int count = columns * rows;
+    if (sampler->empty) {
+        pl_shade_nothing(sampler->shader, (unsigned)count, colors);
+        return true;
+    }
     if (sampler->options->antialias == PL_AA_ADAPTIVE) return adaptive_block(sampler, x, y, columns, rows, colors, error);
     if (sampler->options->antialias == PL_AA_GRID) {
         for (int i = 0; i < count; i++)

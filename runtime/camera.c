@@ -82,15 +82,34 @@ void pl_camera_direction(const pl_camera *camera, double x, double y, int width,
     set_direction(camera, x / width - 0.5, 0.5 - y / height, direction);
 }
 
+typedef double pl_row __attribute__((vector_size(8 * PL_CAMERA_COLUMNS)));
+
+/* set_direction in a row of columns: a square root or quotient in a vector has the bits of one alone. */
+static void set_row(const pl_camera *camera, pl_row across, double above, int columns, double (*row)[3])
+{
+    pl_row d[3], length;
+    for (int axis = 0; axis < 3; axis++) d[axis] = camera->forward[axis] + across * camera->right[axis] + above * camera->up[axis];
+    const pl_row square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    bool usual = true;
+    for (int i = 0; i < PL_CAMERA_COLUMNS; i++) {
+        usual = usual && square[i] > PL_LEAST_SQUARE && square[i] < PL_MOST_SQUARE;
+        length[i] = sqrt(square[i]);
+    }
+    for (int axis = 0; axis < 3; axis++) d[axis] /= length;
+    for (int i = 0; i < columns; i++) {
+        if (!usual) set_direction(camera, across[i], above, row[i]);
+        else
+            for (int axis = 0; axis < 3; axis++) row[i][axis] = d[axis][i];
+    }
+}
+
 void pl_camera_directions(const pl_camera *camera, int left, int top, int columns, int rows, int width, int height,
                           double (*directions)[3])
 {
-    double across[PL_CAMERA_COLUMNS];
-    for (int i = 0; i < columns; i++) across[i] = (left + i + 0.5) / width - 0.5;
-    for (int row = 0; row < rows; row++) {
-        const double above = 0.5 - (top + row + 0.5) / height;
-        for (int i = 0; i < columns; i++) set_direction(camera, across[i], above, *directions++);
-    }
+    pl_row across;
+    for (int i = 0; i < PL_CAMERA_COLUMNS; i++) across[i] = (left + i + 0.5) / width - 0.5;
+    for (int row = 0; row < rows; row++, directions += columns)
+        set_row(camera, across, 0.5 - (top + row + 0.5) / height, columns, directions);
 }
 
 double pl_camera_spread(const pl_camera *camera, int width, int height)

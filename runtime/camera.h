@@ -20,7 +20,7 @@ bool pl_camera_create(const double *record, pl_camera *camera, pl_error *error);
 void pl_camera_direction(const pl_camera *camera, double x, double y, int width, int height, double direction[3]);
 
 /* Through the centres of columns x rows pixels from (left, top) on, row by row; at most PL_CAMERA_COLUMNS a row. */
-enum { PL_CAMERA_COLUMNS = 16 };
+enum { PL_CAMERA_COLUMNS = 4 };
 void pl_camera_directions(const pl_camera *camera, int left, int top, int columns, int rows, int width, int height,
                           double (*directions)[3]);
 

@@ -1,7 +1,9 @@
 /* quantise.c - see quantise.h. */
 #include "quantise.h"
 
+#include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "elementary.h"
 #include "plsys.h"
@@ -12,13 +14,25 @@ void pl_quantiser_init(pl_quantiser *quantiser)
         const double srgb = (i + 0.5) / 255.0;
         quantiser->thresholds[i] = srgb <= 0.04045 ? srgb / 12.92 : pl_pow((srgb + 0.055) / 1.055, 2.4);
     }
+    quantiser->thresholds[255] = INFINITY;
+    unsigned reached = 0;
+    for (uint32_t cell = 0; cell < PL_CELLS; cell++) {
+        const uint32_t bits = (PL_FIRST_CELL + cell) << 16;
+        float first;
+        memcpy(&first, &bits, sizeof first);
+        while ((double)first >= quantiser->thresholds[reached]) reached++;
+        quantiser->cells[cell] = (uint8_t)reached;
+    }
 }
 
 uint8_t pl_srgb(const pl_quantiser *quantiser, float linear)
 {
-    unsigned reached = 0;
-    for (unsigned step = 128; step; step /= 2)
-        if ((double)linear >= quantiser->thresholds[reached + step - 1]) reached += step;
+    uint32_t bits;
+    if (!(linear >= 0x1p-13f)) return 0;
+    if (linear >= 1.0f) return 255;
+    memcpy(&bits, &linear, sizeof bits);
+    unsigned reached = quantiser->cells[(bits >> 16) - PL_FIRST_CELL];
+    while ((double)linear >= quantiser->thresholds[reached]) reached++;
     return (uint8_t)reached;
 }
 

@@ -534,13 +534,31 @@ bool pl_shade_first(pl_shader *shader, const double direction[3], pl_first *firs
     return set_first(shader, shader->hits, &surface, first, error);
 }
 
+bool pl_shade_misses(const pl_shader *shader, const double (*directions)[3])
+{
+    return pl_trace_misses(shader->view->scene, shader->view->camera.location, directions);
+}
+
+/* The eye sees nothing at all, for the two limits on rays. */
+static bool is_blind(const pl_view *view)
+{
+    return !(0 < view->max_trace_level) || 1.0 < view->adc_bailout;
+}
+
+void pl_shade_nothing(pl_shader *shader, unsigned count, double (*colors)[3])
+{
+    memset(colors, 0, count * sizeof *colors);
+    if (is_blind(shader->view)) return;
+    shader->rays.primary += count;
+    for (unsigned i = 0; i < count; i++)
+        for (int c = 0; c < 3; c++) colors[i][c] += shader->view->background[c];
+}
+
 bool pl_shade(pl_shader *shader, const double (*directions)[3], unsigned count, double (*colors)[3], pl_first *first,
               pl_error *error)
 {
-    const pl_view *view = shader->view;
     memset(colors, 0, count * sizeof *colors);
-    if (!(0 < view->max_trace_level) || 1.0 < view->adc_bailout)
-        return !first || pl_shade_first(shader, *directions, first, error);
+    if (is_blind(shader->view)) return !first || pl_shade_first(shader, *directions, first, error);
     if (first) begin_first(shader, first);
     shader->rays.primary += count;
     for (unsigned i = 0; i < count; i++) look(shader, i, directions[i]);

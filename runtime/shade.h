@@ -55,6 +55,12 @@ typedef struct pl_first {
 bool pl_shade(pl_shader *shader, const double (*directions)[3], unsigned count, double (*colors)[3], pl_first *first,
               pl_error *error);
 
+/* true: a camera's rays in directions between these four, going round, meet nothing. false: some may. */
+bool pl_shade_misses(const pl_shader *shader, const double (*directions)[3]);
+
+/* As pl_shade, where it is known that the rays meet nothing. */
+void pl_shade_nothing(pl_shader *shader, unsigned count, double (*colors)[3]);
+
 /* The first hit alone. */
 bool pl_shade_first(pl_shader *shader, const double direction[3], pl_first *first, pl_error *error);
 

@@ -143,6 +143,11 @@ unsigned pl_trace_nearest_many(pl_tracer *tracer, const pl_ray *rays, unsigned c
     return count;
 }
 
+bool pl_trace_misses(const pl_scene *scene, const double eye[3], const double (*directions)[3])
+{
+    return scene->accel->misses && scene->accel->misses(scene, eye, directions);
+}
+
 bool pl_trace_number(pl_tracer *tracer, pl_hit *hit, pl_error *error)
 {
     const pl_scene *scene = tracer->scene;

@@ -62,6 +62,9 @@ bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_erro
 enum { PL_TRACE_MANY = 16 };
 unsigned pl_trace_nearest_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_hit *hits, pl_error *error);
 
+/* true: no ray from the eye in a direction between these four, going round, meets anything. false: one may. */
+bool pl_trace_misses(const pl_scene *scene, const double eye[3], const double (*directions)[3]);
+
 /* Makes sure that a hit's primitive index is known: where states are unfolded on touch, tracing doesn't count. */
 bool pl_trace_number(pl_tracer *tracer, pl_hit *hit, pl_error *error);
 

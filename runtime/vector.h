@@ -18,12 +18,16 @@ static inline void pl_cross(const double a[3], const double b[3], double out[3])
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+/* Squares of lengths that are surely far from the ends of the range of doubles. */
+#define PL_LEAST_SQUARE 1e-250
+#define PL_MOST_SQUARE 1e250
+
 /* Divides v by its length, which is returned: also where the squares would leave the range of doubles. A vector that
  * has no direction (zero, or not finite) stays as it is, and the result is 0. */
 static inline double pl_normalize(double v[3])
 {
     const double square = pl_dot(v, v);
-    if (square > 1e-250 && square < 1e250) {
+    if (square > PL_LEAST_SQUARE && square < PL_MOST_SQUARE) {
         const double length = sqrt(square);
         for (int axis = 0; axis < 3; axis++) v[axis] = v[axis] / length;
         return length;

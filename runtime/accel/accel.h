@@ -96,6 +96,8 @@ struct pl_accel {
     bool (*trace)(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
     /* The same for up to PL_TRACE_MANY rays. NULL: one by one. */
     bool (*trace_many)(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
+    /* true: no ray from the eye in a direction between these four, going round, meets anything. NULL: it can't tell. */
+    bool (*misses)(const pl_scene *scene, const double eye[3], const double (*directions)[3]);
     /* The items from the scene's to the leaf's at a trail; none: there is a path. NULL: its hits have paths. false: no memory. */
     bool (*items)(const pl_scene *scene, const pl_path *trail, pl_items *items);
     /* The path in union terms at a trail that has no items. false: no memory. */

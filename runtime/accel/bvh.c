@@ -176,6 +176,11 @@ static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries,
     return kernel(tracer, rays, queries, count);
 }
 
+static bool misses(const pl_scene *scene, const double eye[3], const double (*directions)[3])
+{
+    return pl_front_misses(((const pl_fronts *)scene->structure)->list, eye, directions);
+}
+
 const pl_accel pl_accel_bvh = {.name = "bvh",
                                .states = true,
                                .build = pl_fronts_build,
@@ -184,4 +189,5 @@ const pl_accel pl_accel_bvh = {.name = "bvh",
                                .work_destroy = work_destroy,
                                .trace = trace,
                                .trace_many = trace_many,
+                               .misses = misses,
                                .items = trail_items};

@@ -11,6 +11,7 @@
  *
  *     front_pilot.c  rays -> visits      front_plan.c  visits, budget -> what is opened where
  *     front_open.c   state -> items      front_tree.c  items -> nodes      front.c  all fronts
+ *     front_pyramid.c  many rays of the eye at once
  *
  * References (pl_ref) name a node, a primitive or an instance of a front: kind in the top 4 bits, index below. */
 #ifndef PL_FRONT_H
@@ -131,6 +132,11 @@ typedef struct pl_fronts {
     uint64_t flat_bytes, limit_items; /* limit_items: of fronts that are made by themselves */
     double pilot_seconds;
 } pl_fronts;
+
+/* --- front_pyramid.c --- */
+
+/* true: no ray from the eye in a direction between these four (going round) meets anything in the front. false: one may. */
+bool pl_front_misses(const pl_front *front, const double eye[3], const double (*directions)[3]);
 
 /* --- front_open.c --- */
 
