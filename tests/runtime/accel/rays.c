@@ -1,6 +1,6 @@
 /* rays.c - one scene, every accelerator, every entry point: the answers must be the same bits. For the sanitizers too.
  *
- *     rays SCENE.plsb        exit code 0, or lines that say what differs
+ *     rays SCENE.plsb [COUNT]        exit code 0, or lines that say what differs; COUNT rays instead of 1500
  *
  * nearest (pl_intersect with 1 and 4 threads) = first of pl_trace_all · pl_occluded = nearest within the distance ·
  * every hit's surface has a unit normal and a texture · the unfolding counts, of what symbols generate, as much as the states do. */
@@ -14,6 +14,7 @@
 
 enum { RAYS = 1500, BATCH = 100 };
 
+static int rays = RAYS;
 static double origins[3 * RAYS], directions[3 * RAYS], distance[RAYS];
 static uint64_t state = 7;
 
@@ -40,7 +41,7 @@ static void *read_file(const char *path, size_t *length)
 /* Sixteen rays that follow the first of them closely enough to be traced together. */
 static void follow(int first)
 {
-    for (int i = first + 1; i < first + 16 && i < RAYS; i++)
+    for (int i = first + 1; i < first + 16 && i < rays; i++)
         for (int axis = 0; axis < 3; axis++) {
             origins[3 * i + axis] = origins[3 * first + axis];
             directions[3 * i + axis] = directions[3 * first + axis] * uniform(0.995, 1.005);
@@ -60,7 +61,7 @@ static void make_rays(pl_scene *scene)
         known += (size_t)got;
     pl_unfold_end(unfolding);
     CHECK(known > 0);
-    for (int i = 0; i < RAYS; i++) {
+    for (int i = 0; i < rays; i++) {
         const double *m = matrices + 12 * (size_t)uniform(0, (double)known);
         for (int axis = 0; axis < 3; axis++) {
             double target = m[4 * axis + 3] + uniform(0, 0.5) * m[4 * axis] + uniform(0, 1) * m[4 * axis + 2];
@@ -73,7 +74,7 @@ static void make_rays(pl_scene *scene)
         }
         distance[i] = uniform(0.5, 1.5);
     }
-    for (int i = RAYS / 2 / 16 * 16; i < RAYS; i += 16) follow(i);
+    for (int i = rays / 2 / 16 * 16; i < rays; i += 16) follow(i);
 }
 
 typedef struct answers {
@@ -105,7 +106,7 @@ static void check_tracer(pl_scene *scene, const answers *expected)
     pl_hit hit;
     pl_hit_init(&hit);
     pl_tracer *tracer = pl_tracer_create(scene, &error);
-    for (int i = 0; i < RAYS; i++) {
+    for (int i = 0; i < rays; i++) {
         pl_ray ray = {.t_min = 0.0, .t_max = INFINITY};
         memcpy(ray.origin, origins + 3 * i, sizeof ray.origin);
         memcpy(ray.direction, directions + 3 * i, sizeof ray.direction);
@@ -133,7 +134,7 @@ static void ask_shadows(pl_scene *scene, answers *a)
 {
     pl_error error;
     pl_tracer *tracer = pl_tracer_create(scene, &error);
-    for (int i = 0; i < RAYS; i++) {
+    for (int i = 0; i < rays; i++) {
         pl_ray ray = {.t_min = 0.0, .t_max = distance[i], .shadow = true};
         memcpy(ray.origin, origins + 3 * i, sizeof ray.origin);
         memcpy(ray.direction, directions + 3 * i, sizeof ray.direction);
@@ -147,9 +148,9 @@ static void ask(pl_scene *scene, answers *a)
 {
     pl_error error;
     pl_hits hits = {a->t, a->primitive, a->symbol, a->rule, a->depth, a->normal, NULL};
-    CHECK(pl_intersect(scene, RAYS, origins, directions, &hits, &error));
-    CHECK(pl_occluded(scene, RAYS, origins, directions, distance, a->occluded, &error));
-    for (int i = 0; i < RAYS; i++) CHECK(a->occluded[i] == (a->t[i] < distance[i]));
+    CHECK(pl_intersect(scene, rays, origins, directions, &hits, &error));
+    CHECK(pl_occluded(scene, rays, origins, directions, distance, a->occluded, &error));
+    for (int i = 0; i < rays; i++) CHECK(a->occluded[i] == (a->t[i] < distance[i]));
     ask_shadows(scene, a);
 }
 
@@ -171,7 +172,9 @@ int main(int argc, char **argv)
 {
     static answers first, other;
     size_t length;
-    if (argc != 2) return 3;
+    if (argc != 2 && argc != 3) return 3;
+    if (argc == 3) rays = atoi(argv[2]);
+    if (rays < 1 || rays > RAYS) return 3;
     void *bytes = read_file(argv[1], &length);
     for (int accelerator = PL_NONE; accelerator <= PL_GRID; accelerator++)
         for (int threads = 1; threads <= 4; threads += 3) {
