@@ -167,7 +167,7 @@ def forest(bench: Bench) -> None:
 
 def terrain(bench: Bench) -> None:
     """Midpoint displacement: 2,097,152 different triangles, against Embree on the same ones."""
-    case = Case("terrain", "terrain", {"level": 8 if bench.quick else 10}, bench.folder)
+    case = Case("terrain", "terrain", {"level": 10}, bench.folder)
     scene = write_embree(case.folder / "triangles.bin", [(TRIANGLES, case.triangles())], [])
     last = against_embree(bench, case, scene, {}, {"coherent": 1.0, "random": 1.0}, "of Embree triangles, single rays")
     if not last:
