@@ -25,11 +25,17 @@ from .text import Edit, Positions, encode
 
 logger = logging.getLogger(__name__)
 
-# A list of more messages than this helps nobody, and slows down the editor.
+# A list of more messages than this helps nobody, and slows down the editor. The most severe ones are
+# kept, and what is only unnecessary goes first.
 MAX_DIAGNOSTICS = 500
 
 SEVERITY = {"error": 1, "warning": 2, "info": 3}
 UNNECESSARY = {"unused", "unreachable", "unreachable-rule"}
+
+
+def _weight(message: Message) -> tuple[int, bool]:
+    found = message.diagnostic
+    return SEVERITY[found.severity], found.code in UNNECESSARY
 
 
 class UnknownDocument(Exception):
@@ -152,7 +158,10 @@ class Workspace:
     def diagnostics(self, document: Document) -> list[dict]:
         """The protocol's Diagnostics of ``document``, as far as they are known now."""
         scene = self.scene(document)
-        messages = scene.messages(document)[:MAX_DIAGNOSTICS]
+        messages = scene.messages(document)
+        if len(messages) > MAX_DIAGNOSTICS:
+            kept = sorted(range(len(messages)), key=lambda i: _weight(messages[i]))[:MAX_DIAGNOSTICS]
+            messages = [messages[i] for i in sorted(kept)]
         positions = self.positions(document)
         found = [self._diagnostic(scene, positions, message) for message in messages]
         return [*found, *self._in_included_files(scene, document)] if len(scene.documents) > 1 else found

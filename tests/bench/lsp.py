@@ -343,7 +343,7 @@ def measured(bench: Bench, edits: int) -> Bench:
 def tied(text: str) -> str:
     """The scene with one object that enters all plants, so that it is one part to the whole-file checks."""
     count = text.count("// Plant ")
-    places = (f"T_place{i} Tree{i}" for i in range(count))
+    places = (f"T_place{i} Bark{i} Tree{i}" for i in range(count))
     text = re.sub(r"object \{ Tree(\d+) .*", r"Transformation T_place\1 { trans \1 0 0; }", text)
     return f"{text}Selection Forest {{ Forest -> {' + '.join(places)}; }}\nobject {{ Forest }}\n"
 

@@ -133,3 +133,12 @@ def test_a_change_that_makes_no_sense_loses_none_before_it():
     document = {"uri": editor.uri("scene.plsys"), "version": 2}
     editor.notify("textDocument/didChange", {"textDocument": document, "contentChanges": [good, {"range": 3}]})
     assert editor.codes() == ["unknown-name"]
+
+
+def test_of_very_many_messages_the_most_severe_are_told():
+    unused = "".join(f"Transformation T{i} {{ scale 2; }}\n" for i in range(600))
+    editor = Editor(unused + "object { S }\nSelection S { S -> Flat sphere; }\nTransformation Flat { scale 0; }\n")
+    found = editor.checked()
+    assert len(found) == 500 and "singular" in {each["code"] for each in found}
+    places = [each["range"]["start"]["line"] for each in found]
+    assert places == sorted(places)
