@@ -1,8 +1,9 @@
 """Pictures on disk: pixels in, an image file out.
 
 Formats that hold floats (exr, hdr, pfm, tif) get linear floats, others (png, jpg, …) 8-bit sRGB; ``linear16`` gives
-16-bit linear values, for comparison with other renderers. OpenImageIO writes all of them but the ordinary .png (png.py): it takes
-36 MB, more than the whole of a process that draws a small scene, and is imported when it is needed, as NumPy is for arrays.
+16-bit linear values, for comparison with other renderers. OpenImageIO writes all of them but the ordinary .png: it takes
+36 MB, more than the whole of a process that draws a small scene, and Pillow 9 MB. Either is imported when something is
+written, and NumPy for arrays only.
 
 Example::
 
@@ -29,7 +30,7 @@ USUAL_FORMATS = (".png", ".exr", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".bmp
 # The runtime's channel → OpenImageIO's names of the type and of the colour space.
 STORED = {"color": ("float", "lin_rec709"), "srgb": ("uint8", "sRGB"), "linear16": ("uint16", "lin_rec709")}
 
-# Of 1 to 9, in files of 16 bits. Beyond it rendered pictures become a tenth smaller in twice the time.
+# Of 1 to 9. Beyond it rendered pictures become a tenth smaller in twice the time.
 PNG_COMPRESSION = 3
 
 
@@ -96,12 +97,19 @@ def write_pixels(
 
 
 def _write_png(path: Path, pixels: memoryview | np.ndarray, width: int, height: int, metadata: dict[str, str]) -> None:
-    """The metadata become texts, under PNG's own names where it has one, as OpenImageIO writes them."""
-    from .png import write_png
+    """8-bit sRGB. The metadata become texts, under PNG's own names where it has one, as OpenImageIO writes them."""
+    from PIL import Image, PngImagePlugin
 
-    texts = {{"ImageDescription": "Description"}.get(name, name): value for name, value in metadata.items()}
+    texts = PngImagePlugin.PngInfo()
+    texts.add(b"sRGB", bytes([0]))
+    for name, value in metadata.items():
+        # Plain texts are Latin-1, which not all readers know; international ones are UTF-8.
+        add = texts.add_text if value.isascii() else texts.add_itxt
+        add({"ImageDescription": "Description"}.get(name, name), value)
+    picture = Image.frombuffer("RGB", (width, height), memoryview(pixels).cast("B"), "raw", "RGB", 0, 1)
     with written_whole(path) as temporary:
-        write_png(temporary, memoryview(pixels).cast("B"), width, height, texts)
+        # Without a format's name: asked for one, Pillow imports all that it has.
+        picture.save(temporary, pnginfo=texts, compress_level=PNG_COMPRESSION)
 
 
 def check_format(path: str | Path) -> None:
