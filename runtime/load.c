@@ -238,11 +238,3 @@ char *pl_program_place(const pl_program *program, uint32_t node, char *buffer, s
         buffer[0] = '\0';
     return buffer;
 }
-
-uint32_t pl_program_rule(const pl_program *program, uint32_t index)
-{
-    for (uint32_t i = 0; i < program->rule_count; i++)
-        if (program->nodes[program->rules[i]].as.rule.index == index)
-            return program->rules[i];
-    return UINT32_MAX;
-}

@@ -149,9 +149,6 @@ void pl_program_free(pl_program *program);
 /* "file:line:column" of a node, or "" if it has no place. Returns buffer. */
 char *pl_program_place(const pl_program *program, uint32_t node, char *buffer, size_t size);
 
-/* The node of rule `index` (rules count in source order, some may be missing), or UINT32_MAX. */
-uint32_t pl_program_rule(const pl_program *program, uint32_t index);
-
 /* pl_fail at a node's place. Always returns false. */
 bool pl_fail_at(pl_error *error, int code, const pl_program *program, uint32_t node, const char *format, ...)
     __attribute__((format(printf, 5, 6)));

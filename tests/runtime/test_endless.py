@@ -216,7 +216,7 @@ def test_deep_zoom_draws_what_the_magnified_scene_shows(levels):
     if levels:
         sponge = SPONGE.replace("Sponge  -> [ scale 1/3 ] (", "if (n > 0) Sponge -> [ --n ] [ scale 1/3 ] (")
         sponge = sponge.replace("Plate); }", "Plate); else Sponge -> box; }", 1)
-        sponge = sponge.replace("{ if", f"{{ C_n Sponge; if", 1) + "Calculation C_n { n = %d; }"
+        sponge = sponge.replace("{ if", "{ C_n Sponge; if", 1) + "Calculation C_n { n = %d; }"
     else:
         sponge = SPONGE
     zoom = 3.0**19

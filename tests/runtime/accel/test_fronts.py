@@ -187,11 +187,11 @@ def test_threads_build_the_same_fronts():
         with Scene(data, front_items=ALL, threads=threads) as scene:
             hits = scene.intersect(origins, directions)
             counts = scene.statistics
-        seen.append([counts[name] for name in ("box_tests", "filtered", "primitive_tests", "bytes", "front")])
-        expected = hits if threads == 1 else expected
-        for ours, theirs in zip(hits, expected):
+        seen.append((hits, [counts[name] for name in ("box_tests", "filtered", "primitive_tests", "bytes", "front")]))
+    for hits, counts in seen:
+        assert counts == seen[0][1]
+        for ours, theirs in zip(hits, seen[0][0]):
             np.testing.assert_array_equal(ours, theirs)
-    assert all(counts == seen[0] for counts in seen)
 
 
 def test_what_pays_is_opened_and_no_more():
