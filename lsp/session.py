@@ -87,6 +87,7 @@ class Session:
         self._published: dict[str, tuple[int | None, list[dict]]] = {}
         self._published_at: dict[Document, float] = {}  # of those with work left
         self._waiting: list[dict] = []  # requests about files that are being opened
+        self._has_opened = False  # a file was opened that the checks don't know yet
         self._shown_early = False  # semantic tokens were sent without knowing all names
         self._next_id = 0
         self._asked: dict[str, Callable[[dict], None]] = {}  # requests of ours that wait for an answer
@@ -250,6 +251,8 @@ class Session:
                             "registerOptions": {"watchers": watchers}}
             self.ask("client/registerCapability", {"registrations": [registration]})
         self.workspace.scans.scan(self.workspace.folders.values())
+        if self._checker is not None:
+            self._checker.prepare()
         prepare_messages()
 
     def _exit(self, params: dict) -> None:
@@ -267,6 +270,7 @@ class Session:
         given = params["textDocument"]
         document = self.workspace.did_open(given["uri"], given["text"], given["version"])
         self._published_at[document] = time.thread_time()
+        self._has_opened = True
         self._touch(document)
 
     def _did_change(self, params: dict) -> None:
@@ -335,6 +339,9 @@ class Session:
                     self._published_at[document] = now
         if finished:
             self._published_at.clear()
+        if self._has_opened and not self.workspace.is_opening and self._checker is not None:
+            self._has_opened = False
+            self._checker.go()  # before anything is typed: the worker has a lot to read
         if (self._waiting or self._shown_early) and not self.workspace.is_opening:
             self._answer_waiting()
 

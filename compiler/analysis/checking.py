@@ -30,10 +30,10 @@ from ..reading.model import Empty, Model, SceneObject
 from ..reading.resolve_names import _identity
 from ..reading.source import Span
 from . import telling
-from .exchange import Answer, Request
+from .exchange import Answer, NewBlock, Request
 from .facts import drop_facts, facts_of
 from .interruption import Interrupted, Interruption
-from .parts import Part, Parts
+from .parts import Part, Parts, role_of
 from .split import Shape
 from .text import Block
 from .worker import streams
@@ -43,10 +43,6 @@ LATE_CODES = frozenset(("file",))
 
 # How often the worker tells what it has found out about parts that no edit touched.
 SLICE_S = 0.2
-
-# What is known about a large scene is many objects that stay: garbage is searched for among those that came since the last
-# text, when nothing is to do. What blocks and their facts say of each other is taken apart (facts.drop_facts).
-GARBAGE_THRESHOLDS = 200_000, 10, 1_000
 
 
 @dataclass
@@ -83,8 +79,9 @@ class SceneState:
             old, new = before.pop(file.name, []), self.blocks.setdefault(file.name, [])
             kept = 0
             for piece in file.pieces:
-                if isinstance(piece, bytes):
-                    new.append(Block(file.name, piece, file.path, Shape(False, 0, 0, False)))
+                if isinstance(piece, NewBlock):
+                    new.append(Block(file.name, piece.text, file.path, Shape(False, 0, 0, False)))
+                    new[-1].__dict__["role"] = piece.role
                     added.append(new[-1])
                 else:
                     removed += old[kept : piece[0]]
@@ -92,8 +89,8 @@ class SceneState:
                     kept = piece[1]
             removed += old[kept:]
         removed += [block for blocks in before.values() for block in blocks]
-        self.objects = self.objects.difference(removed).union(filter(_has_object, added))
-        self.including = self.including.difference(removed).union(block for block in added if facts_of(block).includes)
+        self.objects = self.objects.difference(removed).union(block for block in added if role_of(block).places)
+        self.including = self.including.difference(removed).union(block for block in added if role_of(block).includes)
         parts = set(self.parts)
         if removed or added:
             self.parts.change(removed, added)
@@ -106,6 +103,13 @@ class SceneState:
         self.fresh = [part for part in self.parts if part not in parts]
         if self.parts.base.outcome is None:
             self.fresh.append(self.parts.base)
+
+    def drop(self) -> None:
+        """Let go of what was read."""
+        for blocks in self.blocks.values():
+            for block in blocks:
+                block.__dict__["is_gone"] = True
+                drop_facts(block)
 
     def in_order(self) -> dict[Block, int]:
         """The blocks of all files, those of an included file before the block that includes it, with their numbers. Notes
@@ -151,8 +155,9 @@ class Work:
 
     def take(self, request: Request) -> None:
         for number in request.forget:
-            self.scenes.pop(number, None)
             self._due.pop(number, None)
+            if number in self.scenes:
+                self.scenes.pop(number).drop()
         self._due.pop(request.scene, None)
         self._due[request.scene] = None
         self.scenes.setdefault(request.scene, SceneState()).take(request)
@@ -232,12 +237,6 @@ def _share(scene: SceneState) -> float:
     return 1 - sum(map(_is_due, parts)) / len(parts)
 
 
-def _has_object(block: Block) -> bool:
-    from ..reading.resolve_names import OBJECT_BLOCKS
-
-    return any(each.name.name in OBJECT_BLOCKS for each in facts_of(block).blocks)
-
-
 def _checked(scene: SceneState, part: Part, order: dict[Block, int]) -> Outcome:
     from ..reading.check import check
     from ..reading.resolve import resolve
@@ -309,18 +308,34 @@ def main() -> None:
         output.write(pickle.dumps(answer))
         output.flush()
 
-    gc.set_threshold(*GARBAGE_THRESHOLDS)
+    def has_news() -> bool:
+        _tidy()
+        return not requests.empty()
+
+    gc.disable()
     Thread(target=read, daemon=True).start()
+    _load()
     while True:
-        if work.is_done:
-            gc.collect()
-            gc.freeze()
         while work.is_done or not requests.empty():
             request = requests.get()
             if request is None:
                 return
             work.take(request)
         try:
-            work.go_on(send, lambda: not requests.empty())
+            work.go_on(send, has_news)
         except Exception:  # a mistake of ours must not end all checks
             send(work.give_up())
+
+
+def _tidy() -> None:
+    """Search for garbage in cycles among what is new since the last part; the rest, of a large scene, is many objects that
+    stay and takes a quarter of a second. (What blocks and their facts say of each other, facts.drop_facts takes apart.)"""
+    gc.collect(0)
+    gc.freeze()
+
+
+def _load() -> None:
+    """Load what checks need, before the first one is asked for."""
+    from .. import pipeline  # noqa: F401
+    from ..graph import forecast, insights, lower, passes  # noqa: F401
+    from ..reading import check, resolve  # noqa: F401

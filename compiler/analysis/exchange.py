@@ -3,7 +3,7 @@
 A :class:`Request` brings the worker's copy of a scene up to date; each is followed by :class:`Answer`\\ s, up to one without
 ``more`` or up to the next request. Places are numbers: of a file, of a block in it, and bytes in the block.
 
-Example: after an edit of block 7 of the only file, of 20 blocks, ``Request(2, 1, (FileText("a.plsys", None, ((0, 7), b"…", (8, 20))),))``.
+Example: after an edit of block 7 of the only file, of 20 blocks, ``Request(2, 1, (FileText("a.plsys", None, ((0, 7), NewBlock(b"…", role), (8, 20))),))``.
 """
 
 from __future__ import annotations
@@ -12,19 +12,27 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from .insights import Placed
+from .parts import Role
+
+
+class NewBlock(NamedTuple):
+    """The text of a block and its role in the scene, so that the worker reads only what it checks."""
+
+    text: bytes
+    role: Role
 
 
 class FileText(NamedTuple):
-    """A file of a snapshot in ``pieces``: texts of new blocks, and ranges (start, end) of the last request's blocks."""
+    """A file of a snapshot in ``pieces``: new blocks, and ranges (start, end) of the last request's blocks."""
 
     name: str
     path: Path | None
-    pieces: tuple[bytes | tuple[int, int], ...]
+    pieces: tuple[NewBlock | tuple[int, int], ...]
 
     @property
-    def blocks(self) -> list[bytes]:
-        """The texts of new blocks."""
-        return [piece for piece in self.pieces if isinstance(piece, bytes)]
+    def blocks(self) -> list[NewBlock]:
+        """The new blocks."""
+        return [piece for piece in self.pieces if isinstance(piece, NewBlock)]
 
 
 class Request(NamedTuple):

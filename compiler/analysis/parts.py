@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, Iterable, Iterator, NamedTuple
 
 from ..reading import syntax, vocabulary
+from ..reading.resolve_names import OBJECT_BLOCKS
 from .facts import Facts, facts_of
 from .text import Block
 
@@ -23,14 +24,18 @@ _GENERAL = frozenset(("camera", "light_source", "background", "global_settings")
 
 
 class Role(NamedTuple):
-    """``kind``: tied, shared or general; the scene's names that the block uses, and those that it defines or assigns."""
+    """``kind``: tied, shared or general; the scene's names that the block uses, and those that it defines or assigns;
+    whether it places objects and whether it includes files. All that has to be known of a block that isn't checked."""
 
     kind: str
     names: frozenset[str]
     defined: frozenset[str]
+    places: bool
+    includes: bool
 
 
 def role_of(block: Block) -> Role:
+    """The block's role; worked out at the first call, unless it was told with the block (exchange.NewBlock)."""
     found = block.__dict__.get("role")
     if found is None:
         found = block.__dict__["role"] = _role(facts_of(block))
@@ -46,7 +51,8 @@ def _role(facts: Facts) -> Role:
             kind = "general" if facts.blocks or facts.includes else "shared"
         elif not facts.blocks and all(_is_shared(each, names - defined) for each in facts.definitions):
             kind = "shared"
-    return Role(kind, frozenset(names), frozenset(defined))
+    places = any(each.name.name in OBJECT_BLOCKS for each in facts.blocks)
+    return Role(kind, frozenset(names), frozenset(defined), places, bool(facts.includes))
 
 
 def _is_shared(definition: Any, read: set[str]) -> bool:

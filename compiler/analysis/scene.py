@@ -29,6 +29,7 @@ from .deadline import Deadline
 from .document import Document, Meaning, Message, Place
 from .facts import Definition, drop_facts, facts_of, keep_lost
 from .namespace import Namespace
+from .parts import role_of
 from .pending import Pending
 from .resolving import BlockResolver, Router
 from .text import Block, Change
@@ -160,6 +161,7 @@ class Scene:
         if IGNORE_WORD in block.data:
             self._ignoring[block] = None
         self._names.learn(block)
+        role_of(block)  # the whole-file checks ask for it, of all blocks at once
         for each in facts.blocks:
             if each.name.name in self.singles:
                 self.singles[each.name.name][block] = None

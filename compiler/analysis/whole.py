@@ -26,8 +26,9 @@ from ..reading.diagnostics import Diagnostic, Note
 from ..reading.source import Span
 from . import worker
 from .checking import Work
-from .exchange import Answer, FileText, Finding, Request
+from .exchange import Answer, FileText, Finding, NewBlock, Request
 from .insights import kept
+from .parts import role_of
 from .scene import Scene
 from .text import Block
 
@@ -56,16 +57,16 @@ class Snapshot:
         return cls(scene, blocks, Request(number, scene.number, tuple(files)))
 
 
-def _pieces(old: list[Block], new: list[Block]) -> tuple[bytes | tuple[int, int], ...]:
-    """``new`` as texts of blocks that ``old`` hasn't, and ranges of those that it has."""
+def _pieces(old: list[Block], new: list[Block]) -> tuple[NewBlock | tuple[int, int], ...]:
+    """``new`` as blocks that ``old`` hasn't, and ranges of those that it has."""
     start, end = _same(old, new)
     numbers = {block: i for i, block in enumerate(old[start : len(old) - end], start)}
-    pieces: list[bytes | tuple[int, int]] = [(0, start)]
+    pieces: list[NewBlock | tuple[int, int]] = [(0, start)]
     for block in new[start : len(new) - end]:
         number, last = numbers.get(block), pieces[-1]
         if number is None:
-            pieces.append(block.data)
-        elif isinstance(last, tuple) and last[1] == number:
+            pieces.append(NewBlock(block.data, role_of(block)))
+        elif not isinstance(last, NewBlock) and last[1] == number:
             pieces[-1] = last[0], number + 1
         else:
             pieces.append((number, number + 1))
@@ -141,6 +142,11 @@ class Checker:
         self._unanswered: dict[int, Snapshot] = {}  # by number: those that answers may still be about
         self._lock = threading.Lock()
 
+    def prepare(self) -> None:
+        """Start the worker, before there is something to check."""
+        with self._lock:
+            self._has_process()
+
     def want(self, scene: Scene) -> None:
         """Note that ``scene`` has changed; :meth:`go` then checks its latest text."""
         self._wanted[scene] = None
@@ -150,11 +156,17 @@ class Checker:
         wanted, self._wanted = [scene for scene in self._wanted if scene.is_alive], {}
         with self._lock:
             for scene in wanted:
-                try:
-                    self._process = self._process or self._start()
-                except OSError:
-                    return  # no process to be had: editing goes on without these checks
+                if not self._has_process():
+                    return  # editing goes on without these checks
                 self._send(scene)
+
+    def _has_process(self) -> bool:
+        """Whether the worker runs; where it doesn't, it is started if there is a process to be had."""
+        try:
+            self._process = self._process or self._start()
+        except OSError:
+            return False
+        return True
 
     def _send(self, scene: Scene) -> None:
         self._number += 1

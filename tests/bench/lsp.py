@@ -333,7 +333,7 @@ def measured(bench: Bench, edits: int) -> Bench:
         all_of_cursors(bench, max(2, edits // 10))
     burst(bench, max(1, edits // 50))
     requests(bench, edits)
-    checks(bench, edits // 10)
+    checks(bench, max(10, edits // 3))
     bench.client.request("shutdown")
     bench.client.notify("exit")
     bench.client.process.wait(10)

@@ -98,6 +98,24 @@ def test_an_edit_is_checked_with_its_own_part():
     assert answers[-1].findings  # n1 isn't counted down
 
 
+def test_an_edit_is_not_behind_the_reading_of_the_file():
+    project, work = Project(), Work()
+    document = project.open(None, SCENE.encode(), name="x")
+    scene = project.scene_of(document)
+    first = Snapshot.of(scene, 0)
+    work.take(first.request)
+    work.go_on(lambda answer: None, lambda: True)  # the first part
+    at = SCENE.index("--n1") + 2
+    project.edit(document, at, at + 2, b"n2")
+    second, answers = Snapshot.of(scene, 1, first), []
+    work.take(second.request)
+    work.go_on(answers.append, lambda: bool(answers))
+    assert "counter" in {finding.code for finding in answers[0].findings}
+    [blocks] = work.scenes[scene.number].blocks.values()
+    read = {block.data[:21] for block in blocks if "facts" in block.__dict__}
+    assert b"Calculation C_less1 {" in read and b"Calculation C_less0 {" not in read
+
+
 def test_edits_far_apart_leave_what_lies_between():
     project, work = Project(), Work()
     document = project.open(None, SCENE.encode(), name="x")
