@@ -497,6 +497,17 @@ double pl_pow(double a, double b)
     return exponential(scale_by(log_size, b), negative); /* b < 2^63: a logarithm that isn't 0 is above 2^-54 */
 }
 
+double pl_power(double a, double b)
+{
+    if (!(b >= 0 && b <= 1024 && pl_floor(b) == b))
+        return pl_pow(a, b);
+    double power = 1;
+    for (unsigned n = (unsigned)b; n; n >>= 1, a *= a)
+        if (n & 1)
+            power *= a;
+    return power;
+}
+
 /* --- rounding and comparing --- */
 
 double pl_floor(double a)

@@ -28,6 +28,7 @@ double pl_atan2(double y, double x);
 double pl_exp(double a);
 double pl_log(double a);
 double pl_pow(double a, double b); /* special cases as C's pow, Annex F */
+double pl_power(double a, double b); /* for shading: pl_pow, but whole b from 0 to 1024 by squaring, within b 2^-53 */
 double pl_floor(double a);
 double pl_ceil(double a);
 double pl_round(double a); /* halves away from zero */

@@ -54,7 +54,7 @@ static double cone(const pl_light *light, double cosine)
         const double x = (cosine - light->cos_falloff) / (light->cos_radius - light->cos_falloff);
         strength = x * x * (3.0 - 2.0 * x);
     }
-    return light->tightness != 0.0 ? strength * pl_pow(cosine, light->tightness) : strength;
+    return light->tightness != 0.0 ? strength * pl_power(cosine, light->tightness) : strength;
 }
 
 bool pl_light_arriving(const pl_light *light, const double towards[3], double distance, double color[3])
@@ -65,7 +65,7 @@ bool pl_light_arriving(const pl_light *light, const double towards[3], double di
         else strength = cone(light, -pl_dot(towards, light->axis));
     }
     if (light->fade_power > 0.0)
-        strength = strength * 2.0 / (1.0 + pl_pow(distance / light->fade_distance, light->fade_power));
+        strength = strength * 2.0 / (1.0 + pl_power(distance / light->fade_distance, light->fade_power));
     /* Fractional powers of the negative distances behind a parallel light: not a number, so nothing. */
     if (!(strength == strength)) return false;
     for (int c = 0; c < 3; c++) color[c] = strength * light->color[c];

@@ -287,31 +287,14 @@ static double specular_cosine(const pl_shine *shine)
     return cosine > 0.0 ? fmin(cosine, 1.0) : 0.0;
 }
 
-/* No less than cosine^size for 0 <= cosine <= 1: the power of the whole part, by squaring. */
-static double power_bound(double cosine, double size)
-{
-    double power = 1.0;
-    if (!(size >= 0.0)) return INFINITY;
-    for (unsigned n = size < 1023.0 ? (unsigned)size : 1023; n; n >>= 1, cosine *= cosine)
-        if (n & 1) power *= cosine;
-    return power * (1.0 + 0x1p-30) + 0x1p-1000;
-}
-
-/* The highlights' share of a light, the same for all channels: 0 where it is so faint that adding it to the shine's share
- * changes no bit. Powers cost more than all other shading. */
+/* The highlights' share of a light, the same for all channels. */
 static double highlights(const pl_shine *shine)
 {
     const pl_finish *finish = &shine->at->finish;
     const double phong = phong_cosine(shine), specular = specular_cosine(shine);
-    double most = 0.0, sum = 0.0;
-    if (phong > 0.0) most += fabs(finish->phong) * power_bound(phong, finish->phong_size);
-    if (specular > 0.0) most += fabs(finish->specular) * power_bound(specular, 1.0 / finish->roughness);
-    bool shows = false;
-    for (int c = 0; c < 3; c++)
-        shows = shows || shine->share[c] + most != shine->share[c] || shine->share[c] - most != shine->share[c];
-    if (!shows) return 0.0;
-    if (phong > 0.0) sum += finish->phong * pl_pow(phong, finish->phong_size);
-    if (specular > 0.0) sum += finish->specular * pl_pow(specular, 1.0 / finish->roughness);
+    double sum = 0.0;
+    if (phong > 0.0) sum += finish->phong * pl_power(phong, finish->phong_size);
+    if (specular > 0.0) sum += finish->specular * pl_power(specular, 1.0 / finish->roughness);
     return sum;
 }
 
@@ -324,7 +307,7 @@ static bool shines_on(const pl_light *light, pl_shine *shine)
     const double cosine = pl_dot(at->normal, shine->towards);
     if (!(cosine >= LEAST_COSINE) || !pl_light_arriving(light, shine->towards, shine->distance, shine->color))
         return false;
-    const double fall = at->finish.brilliance == 1.0 ? cosine : pl_pow(cosine, at->finish.brilliance);
+    const double fall = at->finish.brilliance == 1.0 ? cosine : pl_power(cosine, at->finish.brilliance);
     for (int c = 0; c < 3; c++) shine->share[c] = at->pigment.color[c] * opacity * (at->finish.diffuse * fall);
     if (shine->share[0] != 0.0 || shine->share[1] != 0.0 || shine->share[2] != 0.0) return true;
     return !light->shadowless && highlights(shine) != 0.0;
