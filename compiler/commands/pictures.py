@@ -3,7 +3,7 @@
 Formats that hold floats (exr, hdr, pfm, tif) get linear floats, others (png, jpg, …) 8-bit sRGB; ``linear16`` gives
 16-bit linear values, for comparison with other renderers. OpenImageIO writes all of them but the ordinary .png: it takes
 36 MB, more than the whole of a process that draws a small scene, and Pillow 9 MB. Either is imported when something is
-written, and NumPy for arrays only.
+written (or, by ``prepare``, while it is drawn), and NumPy for arrays only.
 
 Example::
 
@@ -13,6 +13,8 @@ Example::
 
 from __future__ import annotations
 
+import threading
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,8 +32,8 @@ USUAL_FORMATS = (".png", ".exr", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".bmp
 # The runtime's channel → OpenImageIO's names of the type and of the colour space.
 STORED = {"color": ("float", "lin_rec709"), "srgb": ("uint8", "sRGB"), "linear16": ("uint16", "lin_rec709")}
 
-# Of 1 to 9. Beyond it rendered pictures become a tenth smaller in twice the time.
-PNG_COMPRESSION = 3
+# Of 1 to 9. Beyond it rendered pictures become hardly smaller in up to twice the time.
+PNG_COMPRESSION = 2
 
 
 def stored_channel(path: str | Path, linear16: bool = False) -> str:
@@ -39,6 +41,13 @@ def stored_channel(path: str | Path, linear16: bool = False) -> str:
     if linear16:
         return "linear16"
     return "color" if Path(path).suffix.lower() in FLOAT_FORMATS else "srgb"
+
+
+def prepare(path: str | Path, channel: str) -> None:
+    """Begin to import what will write ``channel`` to ``path``, beside what the caller does next: it takes as long as to
+    draw a small scene."""
+    module = "PIL.PngImagePlugin" if _is_ordinary_png(path, channel) else "OpenImageIO"
+    threading.Thread(target=import_module, args=(module,)).start()
 
 
 def write_picture(
@@ -75,7 +84,7 @@ def write_pixels(
     Raises PlsysError when the format is unknown or the file can't be written; then no file is left."""
     path = Path(path)
     height, width, _ = memoryview(pixels).shape
-    if channel == "srgb" and path.suffix.lower() == ".png":
+    if _is_ordinary_png(path, channel):
         _write_png(path, pixels, width, height, metadata or {})
         return
     import OpenImageIO as oiio
@@ -94,6 +103,10 @@ def write_pixels(
             raise PlsysError(f"don't know the picture format '{path.suffix}'", str(path))
         if not (output.open(str(temporary), spec) and output.write_image(pixels) and output.close()):
             raise PlsysError(f"can't be written: {output.geterror().strip()}", str(path))
+
+
+def _is_ordinary_png(path: str | Path, channel: str) -> bool:
+    return channel == "srgb" and Path(path).suffix.lower() == ".png"
 
 
 def _write_png(path: Path, pixels: memoryview | np.ndarray, width: int, height: int, metadata: dict[str, str]) -> None:

@@ -133,7 +133,7 @@ def aov_names(text: str) -> tuple[str, ...]:
 
 def run(arguments: argparse.Namespace) -> int:
     from . import render_facts
-    from .pictures import check_format
+    from .pictures import check_format, prepare, stored_channel
 
     started = time.perf_counter()
     check_format(arguments.output)
@@ -143,6 +143,7 @@ def run(arguments: argparse.Namespace) -> int:
     data, left_out = _bytecode(arguments)
     seconds = {"read": time.perf_counter() - started}
 
+    prepare(arguments.output, stored_channel(arguments.output, arguments.linear16))
     from ...runtime import Scene
 
     with Scene(
