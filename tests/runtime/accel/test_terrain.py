@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from test_fronts import answers, assert_same, available
-from test_packets import bundles
+from test_together import bundles
 from wooded_hills import WOODED
 from plsys.compiler import compile
 from plsys.runtime import Scene

@@ -1,4 +1,5 @@
-"""Packets: rays that go about the same way are traced together, and nobody can tell by the hits."""
+"""Rays are traced together, and nobody can tell by the hits: in packets where they go about the same way, in streams, a
+step of each in turn, where they don't."""
 
 from __future__ import annotations
 
@@ -45,10 +46,18 @@ def bundles(data: bytes, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(origins), np.concatenate(directions)
 
 
+def scattered(data: bytes, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """The same rays in an order in which neighbours have nothing in common."""
+    origins, directions = bundles(data, seed)
+    order = np.random.default_rng(seed).permutation(len(origins))
+    return origins[order], directions[order]
+
+
+@pytest.mark.parametrize("arranged", [bundles, scattered])
 @pytest.mark.parametrize("name", SCENES)
-def test_packets_do_not_show(name):
+def test_company_does_not_show(name, arranged):
     data = compile(ROOT / "scenes" / f"{name}.plsys", parameters=SCENES[name])
-    origins, directions = bundles(data, 3)
+    origins, directions = arranged(data, 3)
     expected = answers(data, origins, directions, accelerator="boxes")
     assert np.isfinite(expected["t"]).any()
     for items in (1, 21, 256, ALL):
@@ -56,14 +65,31 @@ def test_packets_do_not_show(name):
             assert_same(answers(data, origins, directions, front_items=items, isa=isa), expected, (items, isa))
 
 
+@pytest.mark.parametrize("arranged", [bundles, scattered])
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
 @given(text=scenes(), seed=st.integers(0, 2**32))
-def test_random_scenes_are_the_same_by_packets(text, seed):
+def test_random_scenes_are_the_same_in_company(arranged, text, seed):
     data = compile(text)
-    origins, directions = bundles(data, seed)
+    origins, directions = arranged(data, seed)
     expected = answers(data, origins, directions, accelerator="none")
     for items in (1, ALL):
         assert_same(answers(data, origins, directions, front_items=items), expected, items)
+
+
+@pytest.mark.parametrize("name, parameters", [("menger", {"level": 12}), ("tree", {"order": 40})])
+def test_a_ray_in_company_meets_what_it_meets_alone(name, parameters):
+    """Deep scenes: each ray's stack and frames grow while others are on their way."""
+    data = compile(ROOT / "scenes" / f"{name}.plsys", parameters=parameters)
+    random = np.random.default_rng(2)
+    origins = random.normal(size=(200, 3)) * 4
+    directions = random.uniform(0, 1, (200, 3)) - origins
+    for isa in available(data):
+        with Scene(data, isa=isa, front_items=1, threads=1) as scene:
+            together = scene.intersect(origins, directions)
+            assert np.isfinite(together.t).any()
+            for i in range(len(origins)):
+                alone = scene.intersect(origins[i : i + 1], directions[i : i + 1])
+                assert (together.t[i], together.primitive[i]) == (alone.t[0], alone.primitive[0]), (isa, i)
 
 
 def test_a_ray_that_is_refused_is_named_wherever_it_stands():
