@@ -31,6 +31,10 @@ MAX_MESSAGE_BYTES = 1 << 30
 GARBAGE_THRESHOLDS = 200_000, 10, 1_000
 MANY_OBJECTS = 50_000
 
+# The thread that reads gets its turn after so long, and reads what has come in one go: each turn that it waits for is a delay.
+SWITCH_S = 0.0002
+INPUT_BUFFER_BYTES = 1 << 18
+
 # Whole-file checks begin when nothing was typed for so long: their snapshot costs some milliseconds.
 PAUSE_S = 0.1
 # When a pause is looked for again where something was to do just then.
@@ -45,14 +49,16 @@ class Dispatcher:
         self, write: Callable[[bytes], object], leave: Callable[[], object], loop: asyncio.AbstractEventLoop | None = None
     ) -> None:
         self.write, self.leave, self.loop = write, leave, loop
-        self.session = Session(self.send, self._wake)
+        self.session = Session(self.send, self._wake, lambda: self.arrived > self._delivered)
         self.inbox: deque[Any] = deque()
+        self.arrived = self._delivered = 0  # messages that a thread has read, and those of them that deliver() has seen
         self.cancelled: set[Any] = set()
         self._scheduled = self._has_opened = self._has_closed = self._has_heard = False
         self._pause: asyncio.TimerHandle | None = None
 
     def deliver(self, body: bytes) -> None:
         """Take the bytes of a message. On the event loop's thread."""
+        self._delivered += 1
         self.loop = self.loop or asyncio.get_running_loop()
         try:
             message = json.loads(body)
@@ -167,7 +173,8 @@ def serve_stdio() -> int:
     # Whatever prints by mistake must not end up among the messages.
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     # A stream of its own: Python closes sys.stdin at exit, and aborts when a thread still reads it.
-    stream = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
+    stream = os.fdopen(os.dup(sys.stdin.fileno()), "rb", INPUT_BUFFER_BYTES)
+    sys.setswitchinterval(SWITCH_S)
     return asyncio.run(_serve(stream, output))
 
 
@@ -184,6 +191,7 @@ async def _serve(stream: BinaryIO, output: BinaryIO) -> int:
     def read() -> None:
         try:
             while (body := read_message(stream)) is not None:
+                dispatcher.arrived += 1
                 loop.call_soon_threadsafe(dispatcher.deliver, body)
         except (OSError, ValueError, RuntimeError) as error:
             logger.info("the input ended: %s", error)

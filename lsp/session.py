@@ -20,7 +20,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, Callable
 
-from plsys.compiler.analysis import Checker, Document, Folders, Found, Result, prepare_format, prepare_messages
+from plsys.compiler.analysis import Checker, Deadline, Document, Folders, Found, Result, prepare_format, prepare_messages
 
 from . import features
 from .progress import Progress
@@ -70,10 +70,15 @@ def load_features() -> dict[str, Feature]:
 
 class Session:
     """``send`` takes a message to the client. ``exit_code`` is None until the client ended the session. With ``wake``,
-    whole-file checks run in a process of their own; it is called, in any thread, when their results wait for work()."""
+    whole-file checks run in a process of their own; it is called, in any thread, when their results wait for work().
+    ``is_message_waiting`` breaks off what work() does."""
 
-    def __init__(self, send: Callable[[dict], None], wake: Callable[[], None] | None = None) -> None:
+    def __init__(
+        self, send: Callable[[dict], None], wake: Callable[[], None] | None = None,
+        is_message_waiting: Callable[[], bool] = lambda: False,
+    ) -> None:  # fmt: skip
         self._send = send
+        self._is_message_waiting = is_message_waiting
         self._wake = wake
         self._arrived: deque[Callable[[], None]] = deque()  # what workers found, to be taken in
         self._checker = Checker(lambda result: self._later(self._take, result)) if wake is not None else None
@@ -328,7 +333,9 @@ class Session:
         false."""
         while self._arrived:
             self._arrived.popleft()()
-        finished = self.workspace.project.work(SLICE)
+        finished = self.workspace.project.work(Deadline(SLICE, self._is_message_waiting))
+        if not finished and self._is_message_waiting():
+            return  # what is known now is about to be out of date
         documents, now = self._with_neighbours(), time.thread_time()
         if finished:
             self._changed.clear()
@@ -362,7 +369,8 @@ class Session:
 
     def prepare(self) -> bool:
         """Do for a moment, in a pause, what a request would have to wait for; whether nothing is left of that."""
-        return self.has_work or all(prepare_format(document, SLICE) for document in list(self.workspace.uris))
+        deadline = Deadline(SLICE, self._is_message_waiting)
+        return self.has_work or all(prepare_format(document, deadline) for document in list(self.workspace.uris))
 
     def _later(self, take: Callable[[Any], None], what: Any) -> None:
         """Have ``work`` take in what a worker found. In any thread."""

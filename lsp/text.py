@@ -81,7 +81,8 @@ class Positions:
         """The offset of a position; one outside of the text is taken to be at its nearest end."""
         if line < 0:
             return 0
-        return self.text.line_start(line) + byte_column(self.text.line_bytes(line), character, self.encoding)
+        offset, text = self.text.line(line)
+        return offset + byte_column(text, character, self.encoding)
 
     def position(self, offset: int) -> dict:
         line, before = self.text.locate(offset)
@@ -94,6 +95,8 @@ class Positions:
         """Start and end of a protocol's range."""
         start, end = range_["start"], range_["end"]
         first = self.offset(start["line"], start["character"])
+        if start == end:
+            return first, first
         return first, max(first, self.offset(end["line"], end["character"]))
 
     def edit(self, change: dict) -> Edit:

@@ -23,6 +23,7 @@ from ..reading.source import Span
 from .context import Context, context_at
 from . import queries
 from .actions import Action, TextEdit, line_break
+from .deadline import Deadline
 from .document import Document, Meaning, Message, Outline, Place
 from .facts import Definition, Facts, Name, facts_of, prepare_messages
 from .keys import enters_keys
@@ -40,7 +41,7 @@ from .whole import Checker, Result
 from .whole import run as check_whole
 
 __all__ = [
-    "Action", "Block", "CODES", "Change", "Checker", "Context", "Definition", "Diagnostic", "Document", "Facts", "Folders",
+    "Action", "Block", "CODES", "Change", "Checker", "Context", "Deadline", "Definition", "Diagnostic", "Document", "Facts", "Folders",
     "Formatted", "Found", "GuardInsight", "Insight", "Meaning", "Message", "Motion", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
     "SCENE_SUFFIX", "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "enters_keys", "facts_of", "fix_all", "fixes",
     "format_document", "ignoring", "insights_in", "insights_of", "line_break", "motion_of", "nearest", "prepare_format", "prepare_messages", "queries", "refactorings", "stretching_of", "syntax", "vocabulary",

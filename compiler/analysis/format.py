@@ -58,10 +58,10 @@ def format_document(document: Document, start: int = 0, end: int | None = None) 
     return Formatted(document, edits, skipped)
 
 
-def prepare_format(document: Document, seconds: float) -> bool:
-    """Find out for up to ``seconds`` of processor time what formats the blocks of ``document``, so that formatting it has
-    little left to do; whether all is found out."""
-    deadline, line_end, last = Deadline(seconds), line_end_of(document), len(document.text.blocks) - 1
+def prepare_format(document: Document, deadline: Deadline) -> bool:
+    """Find out up to ``deadline`` what formats the blocks of ``document``, so that formatting it has little left to do;
+    whether all is found out."""
+    line_end, last = line_end_of(document), len(document.text.blocks) - 1
     for index, block in enumerate(document.text.blocks):
         if "formatted" not in block.__dict__ and not facts_of(block).is_broken:
             _edits_of(block, line_end, index == 0, index == last)

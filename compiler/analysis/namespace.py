@@ -93,6 +93,7 @@ class Namespace:
             if self._refresh(name):
                 queue.append(name)
             yield None
+        self._touched = {}  # what once was large takes long to find the first of
         seen = set(queue)
         while queue:
             for block in list(self.users.get(queue.pop(), ())):

@@ -170,10 +170,8 @@ class Project:
 
     # --- work
 
-    def work(self, seconds: float | None = None) -> bool:
-        """Resolve what edits have touched, for at most about ``seconds`` of processor time, so that how far it comes is
-        the same on a busy machine; True when all is done."""
-        deadline = None if seconds is None else Deadline(seconds)
+    def work(self, deadline: Deadline | None = None) -> bool:
+        """Resolve what edits have touched, up to ``deadline``; True when all is done."""
         return all([scene.work(deadline) for scene in self.scenes.values()])
 
     def messages(self, document: Document) -> list[Message]:

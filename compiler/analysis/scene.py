@@ -262,7 +262,7 @@ class Scene:
         tables = (self._syntax, self._include_messages, self._messages, self.whole, self.general)
         noisy = {block for table in tables for block in table}
         for index, block in sorted((order[block], block) for block in noisy if block in order):
-            base = document.text.starts[index]
+            base = document.text.start_at(index)
             for table in tables:
                 found += [Message(d, base + d.span.start, base + d.span.end) for d in table.get(block, ())]
         # Resolving by block and the whole-file checks both look for missing files.
@@ -277,7 +277,7 @@ class Scene:
         found = []
         text = document.text
         for index in sorted(text.order[block] for block in self._ignoring if block in text.order):
-            base, length = text.starts[index], len(text.blocks[index].data)
+            base, length = text.start_at(index), len(text.blocks[index].data)
             data = b"".join(block.data for block in text.blocks[index : index + 2])
             found += [each._replace(start=base + each.start, end=base + each.end)
                       for each in ignores(data) if each.code_start < length]  # fmt: skip

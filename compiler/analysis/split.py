@@ -49,12 +49,17 @@ class Piece(NamedTuple):
     shape: Shape
 
 
+def is_hard(data: bytes) -> bool:
+    """Whether a text begins with a word that nothing can contain."""
+    return _HARD_START.match(data) is not None
+
+
 def split(data: bytes) -> list[Piece]:
     """The pieces of ``data``, which cover it without gaps. A comment that nothing ends counts as its opener only."""
     pieces: list[Piece] = []
     comments: dict[int, int] = {}  # where each comment ends → where it starts
     start = at = depth = low = 0
-    hard, comment = _HARD_START.match(data) is not None, False
+    hard, comment = is_hard(data), False
     while (match := _TOKEN.search(data, at)) is not None:
         kind, at = match.lastgroup, match.end()
         if kind == "brace":

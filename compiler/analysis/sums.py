@@ -56,6 +56,11 @@ class Sums:
         self._gap = low + len(new) - 1
         self._shift += new[-1] - after
 
+    def resize(self, index: int, size: int) -> None:
+        """Piece ``index`` has become as long as ``size``."""
+        self._move(index)
+        self._shift += size - (self[index + 1] - self[index])
+
     def _move(self, index: int) -> None:
         gap, shift = self._gap, self._shift
         if shift:

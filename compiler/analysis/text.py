@@ -21,13 +21,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..reading.source import Source
-from .split import Piece, Shape, group, split
+from .split import Piece, Shape, group, is_hard, split
 from .sums import Sums
 
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 
 # Bytes that begin and end no comment, string, block, definition or line.
 _PLAIN = re.compile(rb"[\w ().,:<>=+|-]*")
+
+# A line on which another piece might begin: see split.py.
+_HEAD_LINE = re.compile(rb"[\r\n][A-Za-z_#]")
 
 
 class Block(Source):
@@ -37,8 +40,7 @@ class Block(Source):
     with the edit inside of it as (start, old end, new end)."""
 
     def __init__(self, name: str, data: bytes, path: Path | None, shape: Shape) -> None:
-        super().__init__(name, data, path)
-        self.__dict__.update(shape=shape, before=None, after=None, is_gone=False)
+        self.__dict__.update(name=name, data=data, path=path, shape=shape, before=None, after=None, is_gone=False)
 
     shape: Shape
     is_gone: bool  # an edit has removed it
@@ -53,6 +55,11 @@ class Block(Source):
     @property
     def line_ends(self) -> int:
         return len(self.line_starts) - 1
+
+    @cached_property
+    def has_head_lines(self) -> bool:
+        """Whether another piece might begin on one of the lines after the first."""
+        return _HEAD_LINE.search(self.data) is not None
 
 
 class Change(NamedTuple):
@@ -100,6 +107,10 @@ class Text:
         """The whole text, joined."""
         return b"".join([block.data for block in self.blocks])
 
+    def start_at(self, index: int) -> int:
+        """Where block ``index`` starts: for a few blocks of many."""
+        return self._starts[index]
+
     def index_at(self, offset: int) -> int:
         """The index of the block with the byte at ``offset``; at the end of the text, of the last block."""
         return max(0, min(self._starts.find(offset), len(self.blocks) - 1))
@@ -133,24 +144,22 @@ class Text:
     def _index_of_line(self, line: int) -> int:
         return min(self._lines.find(line), len(self.blocks) - 1)
 
-    def line_start(self, line: int) -> int:
-        """The offset of a line's first byte; of lines past the end, the text's length."""
-        index = self._index_of_line(line)
-        inside = line - self._lines[index]
-        starts = self.blocks[index].line_starts
-        if inside >= len(starts):
-            return len(self)
-        return self._starts[index] + starts[inside]
-
-    def line_bytes(self, line: int) -> bytes:
-        """The text of a line without its line end."""
+    def line(self, line: int) -> tuple[int, bytes]:
+        """The offset of a line's first byte, and its text without the line end; of lines past the end, the text's
+        length and nothing."""
         index = self._index_of_line(line)
         block, inside = self.blocks[index], line - self._lines[index]
         starts = block.line_starts
         if inside >= len(starts):
-            return b""
+            return len(self), b""
         end = starts[inside + 1] if inside + 1 < len(starts) else len(block.data)
-        return block.data[starts[inside] : end].rstrip(b"\r\n")
+        return self._starts[index] + starts[inside], block.data[starts[inside] : end].rstrip(b"\r\n")
+
+    def line_start(self, line: int) -> int:
+        return self.line(line)[0]
+
+    def line_bytes(self, line: int) -> bytes:
+        return self.line(line)[1]
 
     def slice(self, start: int, end: int) -> bytes:
         first, last = self.index_at(start), self.index_at(max(start, end - 1))
@@ -170,23 +179,37 @@ class Text:
         which that isn't clear."""
         index = self.index_at(start)
         block, base = self.blocks[index], self._starts[index]
-        old, low, high = block.data, start - base, end - base
-        if not _PLAIN.fullmatch(data) or not low or not _PLAIN.fullmatch(old, low - 1, high + 1):
+        old, low, high, shape = block.data, start - base, end - base, block.shape
+        if shape.depth or shape.comment or not low or not _PLAIN.fullmatch(data) or not _PLAIN.fullmatch(old, low - 1, high + 1):
             return None
         # Whether the next block starts where it does is seen at the end of this one.
         ends = len(old.rstrip())
-        if high >= ends or old[ends - 1] not in b"};" or block.shape.depth or block.shape.comment:
+        if high >= ends or old[ends - 1] not in b"};":
             return None
-        if not block.shape.hard and not 0 <= old.find(b"{") < low:
+        if not shape.hard and not 0 <= old.find(b"{") < low:
             return None  # it might be no block any more
         new = old[:low] + data + old[high:]
-        pieces = split(new)
-        if len(pieces) > 1 or pieces[0].shape != block.shape:
+        # Plain bytes are no tokens of the split but in the words that begin a line.
+        if not block.has_head_lines:
+            if is_hard(new) != shape.hard:
+                return None
+        elif [piece.shape for piece in split(new)] != [shape]:
             return None
-        change, _ = self._exchange(index, index + 1, [(new, block.shape)])
+        change = self._swap(index, new) if new != old else Change([], [])
         if change.added:
             _link(change, low, high, len(data))
         return change
+
+    def _swap(self, index: int, data: bytes) -> Change:
+        """Put a block with as many lines and the same shape in the place of one."""
+        old = self.blocks[index]
+        new = self.blocks[index] = Block(self.name, data, self.path, old.shape)
+        new.__dict__["has_head_lines"] = old.has_head_lines
+        old.__dict__["is_gone"] = True
+        self._starts.resize(index, len(data))
+        if self._order is not None:
+            self._order[new] = self._order.pop(old)
+        return Change([old], [new])
 
     def _put(self, start: int, end: int, data: bytes) -> Change:
         # A block's boundaries depend on its own start and on how the block before it ends; so one more block on

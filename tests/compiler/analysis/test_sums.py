@@ -30,6 +30,19 @@ def test_they_are_the_sums(sizes, exchanges):
             assert sums.all() == expected
 
 
+@given(SIZES.filter(bool), st.lists(st.tuples(st.integers(0, 20), st.integers(0, 9)), max_size=12))
+def test_pieces_that_become_longer_or_shorter(sizes, changes):
+    sums = Sums()
+    sums.exchange(0, 0, sizes)
+    for at, size in changes:
+        at %= len(sizes)
+        sums.resize(at, size)
+        sizes[at] = size
+        expected = list(accumulate(sizes, initial=0))
+        assert [sums[i] for i in range(len(expected))] == expected
+        assert sums.total == expected[-1]
+
+
 def test_what_is_no_piece():
     with pytest.raises(IndexError):
         Sums()[1]
