@@ -9,22 +9,32 @@ Example: ``camera { location <0, 0, 0.5> … } sphere { 0, 1 } light_source { <5
 from __future__ import annotations
 
 import math
-from typing import Iterator
+from collections import deque
+from typing import Iterator, NamedTuple
 
 from . import affine
 from .check_scaling import linear_map
 from .diagnostics import Diagnostics
 from .evaluate import NotFinite, fold
-from .model import Constant, Enter, Expression, Model, Primitive
-from .walk import is_open, seed_of, ways
+from .model import Constant, Enter, Expression, Primitive, Production
+from .view import View
+from .walk import is_open, ways
 
 # Places that are tried, and how many Selections deep.
 MAX_PLACES = 2000
 MAX_DEPTH = 8
 
 
-def check_camera(model: Model, diagnostics: Diagnostics) -> None:
+class Placed(NamedTuple):
+    """What a production surely leads to, with the matrix on the way there; ``tried`` is the number of its ways."""
+
+    tried: int
+    leaves: tuple[tuple[Primitive | Enter, affine.Matrix], ...]
+
+
+def check_camera(view: View, diagnostics: Diagnostics) -> None:
     """Report the first shape that holds the camera and no light."""
+    model = view.model
     if model.camera is None:
         return
     camera = dict(model.camera.values).get("location", (0.0, 0.0, 0.0))
@@ -32,12 +42,12 @@ def check_camera(model: Model, diagnostics: Diagnostics) -> None:
     lights = [dict(light.values).get("location", (0.0, 0.0, 0.0)) for light in model.lights]
     if span is None or not lights:
         return
-    for shape, matrix in _shapes(model):
+    for shape, matrix in _shapes(view):
         inverse = affine.inverse(matrix)
-        if inverse is None or not _is_inside(shape, affine.transform_point(inverse, camera), seed_of(model)):
+        if inverse is None or not _is_inside(shape, affine.transform_point(inverse, camera), view.seed):
             continue
         if not any(
-            _is_inside(shape, affine.transform_point(inverse, light), seed_of(model)) for light in lights
+            _is_inside(shape, affine.transform_point(inverse, light), view.seed) for light in lights
         ):
             message = f"the camera stands inside a {shape.shape}, where no light is"
             hint = "move its location, or put a light inside, as in a room"
@@ -48,29 +58,32 @@ def check_camera(model: Model, diagnostics: Diagnostics) -> None:
             return
 
 
-def _shapes(model: Model) -> Iterator[tuple[Primitive, affine.Matrix]]:
+def _shapes(view: View) -> Iterator[tuple[Primitive, affine.Matrix]]:
     """Primitives whose place is constant, with the matrices of their places, in the order of a breadth-first derivation."""
-    seed, tried = seed_of(model), 0
-    waiting = [(placed.body, affine.IDENTITY, 0) for placed in model.objects]
+    symbols, tried = view.model.symbols, 0
+    waiting = deque((placed.body, affine.IDENTITY, 0) for placed in view.model.objects)
     while waiting and tried < MAX_PLACES:
-        body, outer, depth = waiting.pop(0)
-        for way in ways(body):  # type: ignore[arg-type]
-            tried += 1
-            # What stands under an undecided guard may not be there at all.
-            if (
-                any(_value(test, seed) is None for test, _ in way.guards)
-                or way.weights
-                or not is_open(way, seed)
-            ):
-                continue
-            inner = linear_map(way.operators, seed)
-            if inner is None:
-                continue
+        body, outer, depth = waiting.popleft()
+        placed = view.ask(placed_by, body, given=(view.seed,))
+        tried += placed.tried
+        for leaf, inner in placed.leaves:
             matrix = affine.compose(outer, inner)
-            if isinstance(way.leaf, Primitive):
-                yield way.leaf, matrix
-            elif isinstance(way.leaf, Enter) and way.leaf.symbol in model.symbols and depth < MAX_DEPTH:
-                waiting.append((model.symbols[way.leaf.symbol].production, matrix, depth + 1))
+            if isinstance(leaf, Primitive):
+                yield leaf, matrix
+            elif leaf.symbol in symbols and depth < MAX_DEPTH:
+                waiting.append((symbols[leaf.symbol].production, matrix, depth + 1))
+
+
+def placed_by(production: Production, seed: float) -> Placed:
+    several, leaves = list(ways(production)), []
+    for way in several:
+        # What stands under an undecided guard may not be there at all.
+        if any(_value(test, seed) is None for test, _ in way.guards) or way.weights or not is_open(way, seed):
+            continue
+        inner = linear_map(way.operators, seed)
+        if inner is not None and isinstance(way.leaf, Primitive | Enter):
+            leaves.append((way.leaf, inner))
+    return Placed(len(several), tuple(leaves))
 
 
 def _value(expression: Expression, seed: float) -> float | None:

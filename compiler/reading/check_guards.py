@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 
-from .diagnostics import Diagnostics
+from .diagnostics import Diagnostic, Diagnostics
 from .evaluate import NotFinite, fold
 from .intervals import ALL, Interval, is_number
-from .model import Apply, Branch, Constant, Expression, Model, Production, Read
+from .model import Apply, Branch, Constant, Expression, Production, Read, Symbol
 from .source import Span
-from .walk import decided, parts, reads, seed_of
+from .view import View, guards_read
+from .walk import decided, parts, reads
 
 _OPPOSITE = {
     "less": "greater_equal", "greater_equal": "less", "greater": "less_equal", "less_equal": "greater",
@@ -35,16 +36,34 @@ Intervals = dict[str, Interval]
 Comparison = tuple[str, str, float]  # parameter, operation, bound
 
 
-def check_guards(model: Model, assigned: Intervals, diagnostics: Diagnostics) -> None:
-    """Report guards that what stands before them rules out, or that have one outcome for all that is ``assigned``."""
+def check_guards(view: View, diagnostics: Diagnostics) -> None:
+    """Report guards that what stands before them rules out, or that have one outcome for all that is assigned."""
     told: dict[int, list[int]] = {}  # where messages start, by file
     for item in diagnostics.items:
         insort(told.setdefault(id(item.span.source), []), item.span.start)
-    checker = _Guards(seed_of(model), diagnostics)
-    for symbol in model.symbols.values():
-        checker.follow(symbol.production, {})
+    for symbol in view.model.symbols.values():
+        diagnostics.items += view.ask(ruled_out, symbol, given=(view.seed,))
         if not _has_any(told.get(id(symbol.span.source), []), symbol.span):
-            checker.decided_by_assignments(symbol.production, assigned)
+            names = view.ask(guards_read, symbol.production)
+            known = tuple((name, view.intervals[name]) for name in names if view.intervals.get(name, ALL) != ALL)
+            if known:
+                diagnostics.items += view.ask(decided_by_assignments, symbol, given=(view.seed, known))
+
+
+def ruled_out(symbol: Symbol, seed: float) -> list[Diagnostic]:
+    """What is said of guards that those before them rule out."""
+    checker = _Guards(seed)
+    checker.follow(symbol.production, {})
+    return checker.diagnostics.items
+
+
+def decided_by_assignments(symbol: Symbol, seed: float, known: tuple[tuple[str, Interval], ...]) -> list[Diagnostic]:
+    """What is said of guards that come out one way where parameters lie in the intervals that are ``known``."""
+    checker = _Guards(seed)
+    checker.follow(symbol.production, {})
+    before = len(checker.diagnostics.items)
+    checker.decided_by_assignments(symbol.production, dict(known))
+    return checker.diagnostics.items[before:]
 
 
 def _has_any(starts: list[int], span: Span) -> bool:
@@ -57,8 +76,8 @@ def _is_of_numbers(test: Expression) -> bool:
 
 
 class _Guards:
-    def __init__(self, seed: float, diagnostics: Diagnostics) -> None:
-        self.seed, self.diagnostics = seed, diagnostics
+    def __init__(self, seed: float) -> None:
+        self.seed, self.diagnostics = seed, Diagnostics()
         self.told: set[Span] = set()
 
     def follow(self, production: Production, known: Intervals) -> None:

@@ -10,11 +10,14 @@ Example: ``Selection A { A -> [ roty a ] box; }`` placed by ``object { A }``: 'a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 from .diagnostics import Diagnostics
-from .model import Apply, Assign, Calculate, Enter, Expression, Model, Operator, Primitive, Production, Read
+from .model import Apply, Assign, Calculate, Enter, Expression, Operator, Primitive, Production, Read
 from .source import Span
-from .walk import Way, all_ways, expressions_of, operators_of, reads, ways
+from .view import View
+from .walk import Way, expressions_of, reads, ways
 
 Names = frozenset[str]
 
@@ -29,40 +32,90 @@ class Known:
     def joined(self, other: Known | None) -> Known:
         return self if other is None else Known(self.must & other.must, self.may | other.may)
 
-    def with_(self, name: str) -> Known:
-        return Known(self.must | {name}, self.may | {name})
+    def with_(self, names: Names) -> Known:
+        return Known(self.must | names, self.may | names)
 
 
-def check_paths(model: Model, diagnostics: Diagnostics) -> None:
+class Flow(NamedTuple):
+    """What a production does to what is assigned. ``leaves``: (symbol that is entered, what is assigned on the way there).
+    ``exposed``: what is read before anything in the production assigns it."""
+
+    leaves: tuple[tuple[str, Names], ...]
+    exposed: Names
+
+
+def check_paths(view: View, diagnostics: Diagnostics) -> None:
     """Report reads before assignment, each place once."""
-    checker = _Paths(model, diagnostics)
-    for placed in model.objects:
-        checker.follow(placed.body, Known())
-    while checker.waiting:
-        name = checker.waiting.pop()
-        checker.follow(model.symbols[name].production, checker.at[name])
-    checker.reporting = True
-    for placed in model.objects:
-        checker.owner = placed.symbol
-        checker.follow(placed.body, Known())
-    for name, known in list(checker.at.items()):
-        checker.owner = name
-        checker.follow(model.symbols[name].production, known)
+    found = assigned_at(view)
+    reporter = _Reporter(view, diagnostics)
+    starts = [(placed.symbol, placed.body, Known()) for placed in view.model.objects]
+    starts += [(name, view.model.symbols[name].production, known) for name, known in found.items()]
+    for owner, production, known in starts:
+        if not view.ask(flow_of, production).exposed <= known.must:
+            reporter.follow(owner, production, known)
 
 
-class _Paths:
-    def __init__(self, model: Model, diagnostics: Diagnostics) -> None:
-        self.model, self.diagnostics = model, diagnostics
-        self.at: dict[str, Known] = {}
-        self.waiting: list[str] = []
-        self.reporting = False
+def assigned_at(view: View) -> dict[str, Known]:
+    """What is assigned at each symbol that objects lead to."""
+    at: dict[str, Known] = {}
+    waiting: dict[str, None] = {}
+
+    def follow(production: Production, known: Known) -> None:
+        for name, assigned in view.ask(flow_of, production).leaves:
+            if name in view.model.symbols:
+                before = at.get(name)
+                joined = known.with_(assigned).joined(before)
+                if joined != before:
+                    at[name] = joined
+                    waiting[name] = None
+
+    for placed in view.model.objects:
+        follow(placed.body, Known())
+    while waiting:
+        name = waiting.popitem()[0]
+        follow(view.model.symbols[name].production, at[name])
+    return at
+
+
+def flow_of(production: Production) -> Flow:
+    found: dict[tuple[str, Names], None] = {}
+    exposed: set[str] = set()
+    for way in ways(production):
+        assigned: set[str] = set()
+        for test in (*(test for test, _ in way.guards), *way.weights):
+            exposed |= reads(test)
+        for operator in way.operators:
+            together = isinstance(operator, Calculate) and operator.together
+            before = frozenset(assigned) if together else assigned
+            for statement in operator.statements if isinstance(operator, Calculate) else ():
+                exposed |= reads(statement.value if isinstance(statement, Assign) else statement.count) - before
+                if isinstance(statement, Assign):
+                    assigned.add(statement.parameter)
+            if not isinstance(operator, Calculate):
+                for expression in expressions_of(operator):
+                    exposed |= reads(expression) - assigned
+        if isinstance(way.leaf, Primitive):
+            for argument in way.leaf.arguments:
+                exposed |= reads(argument) - assigned
+        elif isinstance(way.leaf, Enter):
+            found[way.leaf.symbol, frozenset(assigned)] = None
+    return Flow(tuple(found), frozenset(exposed))
+
+
+class _Reporter:
+    def __init__(self, view: View, diagnostics: Diagnostics) -> None:
+        self.view, self.diagnostics = view, diagnostics
         self.owner = ""
         self.said: set[tuple[int, int]] = set()
-        self.needed = needed_parameters(model)
 
-    def follow(self, production: Production, known: Known) -> None:
-        """Carry ``known`` along every way of ``production`` to the symbols that it enters."""
-        for way in ways(production):
+    @cached_property
+    def needed(self) -> Names:
+        return needed_parameters(self.view)
+
+    def follow(self, owner: str, production: Production, known: Known) -> None:
+        """Report what each way of ``production`` reads that isn't assigned; ``known`` is what is at its start."""
+        self.owner = owner
+        for way in self.view.ways(production):
             self._way(way, known)
 
     def _way(self, way: Way, known: Known) -> None:
@@ -75,16 +128,6 @@ class _Paths:
         if isinstance(way.leaf, Primitive):
             for argument in way.leaf.arguments:
                 self.read(argument, known)
-        elif isinstance(way.leaf, Enter) and way.leaf.symbol in self.model.symbols:
-            self._enter(way.leaf.symbol, known)
-
-    def _enter(self, name: str, known: Known) -> None:
-        before = self.at.get(name)
-        joined = known.joined(before)
-        if joined != before:
-            self.at[name] = joined
-            if name not in self.waiting:
-                self.waiting.append(name)
 
     def _operator(self, operator: Operator, known: Known) -> Known:
         if not isinstance(operator, Calculate):
@@ -99,13 +142,11 @@ class _Paths:
                 continue
             # What is assigned to no purpose is removed, and its errors with it.
             self.read(statement.value, scope, certain=statement.parameter in self.needed)
-            known = known.with_(statement.parameter)
+            known = known.with_(frozenset((statement.parameter,)))
         return known
 
     def read(self, expression: Expression, known: Known, certain: bool = True) -> None:
         """Report the reads in ``expression``; those that are evaluated only sometimes aren't ``certain``."""
-        if not self.reporting:
-            return
         if isinstance(expression, Apply):
             lazy = expression.operation in ("and", "or", "select")
             for i, argument in enumerate(expression.arguments):
@@ -132,26 +173,14 @@ class _Paths:
         return f"assign it in an entry action: Calculation C_init {{ {name} = 0; }} and, first in {owner}, C_init {owner};"
 
 
-def needed_parameters(model: Model) -> Names:
+def needed_parameters(view: View) -> Names:
     """The parameters that something but assignments depends on, directly or through other parameters."""
     needed: set[str] = set()
     feeds: dict[str, set[str]] = {}
-    for operator in operators_of(model):
-        if isinstance(operator, Calculate):
-            for statement in operator.statements:
-                if isinstance(statement, Assign):
-                    feeds.setdefault(statement.parameter, set()).update(reads(statement.value))
-                else:
-                    needed |= reads(statement.count)
-        else:
-            for expression in expressions_of(operator):
-                needed |= reads(expression)
-    for way in all_ways(model):
-        for expression in (*(test for test, _ in way.guards), *way.weights):
-            needed |= reads(expression)
-        if isinstance(way.leaf, Primitive):
-            for expression in way.leaf.arguments:
-                needed |= reads(expression)
+    for uses in view.uses:
+        needed |= uses.read
+        for name, several in uses.feeds:
+            feeds.setdefault(name, set()).update(several)
     waiting = list(needed)
     while waiting:
         for name in feeds.get(waiting.pop(), ()):

@@ -10,11 +10,13 @@ at once or never.
 
 from __future__ import annotations
 
+from typing import Any, Sequence
+
 from . import affine
 from .check_contraction import stays_large
 from .check_scaling import Back, check_scaling, linear_map
-from .check_termination import Writes, check_termination, cyclic
-from .diagnostics import Diagnostics
+from .check_termination import Starts, Values, check_termination, cyclic, starts_of
+from .diagnostics import Diagnostic, Diagnostics
 from .linear import after, form
 from .model import (
     Apply,
@@ -24,7 +26,6 @@ from .model import (
     Choose,
     Constant,
     Enter,
-    Model,
     Operand,
     Produce,
     Production,
@@ -33,29 +34,83 @@ from .model import (
     Transform,
     Variants,
 )
-from .walk import Way, components, decided, draws, is_open, leaves, reached_symbols, reads, seed_of, ways
+from .view import View, guards_read
+from .walk import Way, components, decided, draws, is_open, leaves, ways
 
 # Guards that stay true for ever when their left side moves this way.
 UNBOUNDED = {"greater": 1, "greater_equal": 1, "less": -1, "less_equal": -1}
 
 
-def check_recursion(model: Model, diagnostics: Diagnostics) -> None:
+def check_recursion(view: View, diagnostics: Diagnostics) -> None:
     """Report on the recursions that the scene's objects lead to."""
-    seed, names = seed_of(model), reached_symbols(model)
-    reached = {name: symbol for name, symbol in model.symbols.items() if name in names}
-    found = components({name: entered(symbol) for name, symbol in reached.items()})
-    endless, writes = _endless(reached, found, seed), Writes(model)
+    reached = {name: symbol for name, symbol in view.model.symbols.items() if name in view.reached}
+    found = components({name: view.entered(symbol.production) for name, symbol in reached.items()})
+    endless = _endless(view, reached, found)
+    place = {name: i for i, name in enumerate(reached)}
     for component in found:
-        members = [reached[name] for name in reached if name in component]
-        if not _is_cycle(members):
-            continue
-        if component & endless:
-            if stays_large(members, seed):
-                _report_endless(members[0], members, diagnostics)
+        members = [reached[name] for name in sorted(component, key=place.__getitem__)]
+        if len(members) > 1 or members[0].name in view.entered(members[0].production):
+            if component & endless:
+                diagnostics.items += view.ask(said_of_endless, *members, given=(view.seed,))
             else:
-                check_scaling(_ways_back(members, component, seed), seed, diagnostics)
+                given = view.seed, _starts_of(view, members)
+                diagnostics.items += view.ask(said_of_cycle, *members, given=given)
+
+
+def _starts_of(view: View, members: list[Symbol]) -> Values:
+    """What parameters in the guards of a recursion have where it is entered: all that it needs to know of the scene."""
+    inside = view.ask(operators_back, *members, given=(view.seed,))
+    names = {name for symbol in members for name in view.ask(guards_read, symbol.production)}
+    return tuple((name, starts_of(view, name, inside)) for name in sorted(names))
+
+
+# --- questions
+
+
+def said_of_endless(*given: Any) -> list[Diagnostic]:
+    """Of symbols that enter each other and never end."""
+    *members, seed = given
+    diagnostics = Diagnostics()
+    if stays_large(members, seed):
+        _report_endless(members[0], members, diagnostics)
+    else:
+        check_scaling(_ways_back(members, seed), seed, diagnostics)
+    return diagnostics.items
+
+
+def said_of_cycle(*given: Any) -> list[Diagnostic]:
+    """Of symbols that enter each other and may end."""
+    *members, seed, starts = given
+    diagnostics = Diagnostics()
+    _check_cycle(members, Starts(seed, dict(starts)), diagnostics)
+    return diagnostics.items
+
+
+def operators_back(*given: Any) -> frozenset[int]:
+    """The ids of the operators on the ways round."""
+    *members, seed = given
+    return frozenset(id(operator) for _, way in _ways_back(members, seed) for operator in way.operators)
+
+
+def endings(production: Production, seed: float) -> tuple[frozenset[str], ...]:
+    """A production ends if all symbols of one of these do."""
+    found: list[frozenset[str]] = []
+    waiting: list[Production] = [production]
+    while waiting:
+        production = waiting.pop()
+        if isinstance(production, Branch):
+            truth = decided(production.test, seed)
+            waiting += [production.then] if truth is not False else []
+            waiting += [production.otherwise] if truth is not True else []
+        elif isinstance(production, Choose):
+            waiting += [each for weight, each in production.cases if not (isinstance(weight, Constant) and weight.value == 0)]
         else:
-            _check_cycle(members, component, writes, diagnostics)
+            body: Operand = production.body if isinstance(production, Produce) else production
+            found.append(frozenset(leaf.symbol for _, leaf in leaves(body) if isinstance(leaf, Enter)))
+    return tuple(dict.fromkeys(found))
+
+
+# --- what is said
 
 
 def _report_endless(symbol: Symbol, members: list[Symbol], diagnostics: Diagnostics) -> None:
@@ -67,15 +122,7 @@ def _report_endless(symbol: Symbol, members: list[Symbol], diagnostics: Diagnost
     diagnostics.add("endless", symbol.name_span, message, hint)
 
 
-def entered(symbol: Symbol) -> set[str]:
-    return {way.leaf.symbol for way in ways(symbol.production) if isinstance(way.leaf, Enter)}
-
-
-def _is_cycle(members: list[Symbol]) -> bool:
-    return len(members) > 1 or members[0].name in entered(members[0])
-
-
-def _endless(symbols: dict[str, Symbol], found: list[frozenset[str]], seed: float) -> set[str]:
+def _endless(view: View, symbols: dict[str, Symbol], found: list[frozenset[str]]) -> set[str]:
     """The symbols none of whose derivations is finite: the complement of a least fixpoint, component by component
     (what a component enters comes before it)."""
     ending: set[str] = set()
@@ -84,45 +131,22 @@ def _endless(symbols: dict[str, Symbol], found: list[frozenset[str]], seed: floa
         while changed:
             changed = False
             for name in component - ending:
-                if _ends(symbols[name].production, ending, seed):
+                if any(needed <= ending for needed in view.ask(endings, symbols[name].production, given=(view.seed,))):
                     ending.add(name)
                     changed = True
     return set(symbols) - ending
 
 
-def _ends(production: Production, ending: set[str], seed: float) -> bool:
-    if isinstance(production, Branch):
-        truth = decided(production.test, seed)
-        then = truth is not False and _ends(production.then, ending, seed)
-        return then or (truth is not True and _ends(production.otherwise, ending, seed))
-    if isinstance(production, Choose):
-        return any(
-            _ends(produce, ending, seed)
-            for weight, produce in production.cases
-            if not (isinstance(weight, Constant) and weight.value == 0)
-        )
-    body: Operand = production.body if isinstance(production, Produce) else production
-    return all(leaf.symbol in ending for _, leaf in leaves(body) if isinstance(leaf, Enter))
-
-
-def _check_cycle(
-    members: list[Symbol], component: frozenset[str], writes: Writes, diagnostics: Diagnostics
-) -> None:
+def _check_cycle(members: list[Symbol], starts: Starts, diagnostics: Diagnostics) -> None:
     """A cycle that can be left: does something change on the way round that its guards look at?"""
-    seed = writes.seed
-    back = _ways_back(members, component, seed)
+    seed = starts.seed
+    back = _ways_back(members, seed)
     if not back:
         return  # all ways round are flattened to nothing
     drawing = [
         (symbol, way) for symbol, way in back if way.weights or any(draws(test) for test, _ in way.guards)
     ]
-    guards = {
-        name
-        for symbol in members
-        for way in ways(symbol.production)
-        for test, _ in way.guards
-        for name in reads(test)
-    }
+    guards = {name for symbol in members for name in guards_read(symbol.production)}
     changed = {name for _, way in back for name in _assigned(way)}
     if drawing and not guards & changed:
         symbol, way = drawing[0]
@@ -145,11 +169,12 @@ def _check_cycle(
         )
         check_scaling(back, seed, diagnostics)
     elif not _check_direction(back, diagnostics):
-        check_termination(back, writes, diagnostics)
+        check_termination(back, starts, diagnostics)
 
 
-def _ways_back(members: list[Symbol], component: frozenset[str], seed: float) -> list[Back]:
+def _ways_back(members: Sequence[Symbol], seed: float) -> list[Back]:
     """The ways from the members of a recursion to its members that can be taken."""
+    component = {symbol.name for symbol in members}
     return [
         (symbol, way)
         for symbol in members

@@ -16,8 +16,12 @@ from . import affine
 from .check_scaling import Back, linear_map
 from .diagnostics import Diagnostics
 from .linear import NOTHING, Form, after, difference, form
-from .model import Apply, Assign, Calculate, Enter, Expression, Model, Read
-from .walk import Way, components, draws, operators_of, seed_of
+from .model import Apply, Enter, Expression, Read
+from .view import View
+from .walk import Way, components, draws
+
+# What parameters have where a recursion is entered, by name.
+Values = tuple[tuple[str, tuple[float, ...] | None], ...]
 
 # Rounds of a counter that are tried out to see whether it meets a value.
 MAX_ROUNDS = 100_000
@@ -38,10 +42,9 @@ class Need(NamedTuple):
     test: Expression
 
 
-def check_termination(back: list[Back], writes: Writes, diagnostics: Diagnostics) -> None:
-    """Report on the ways ``back`` of one recursion, of which none is unguarded. ``writes`` are the scene's."""
+def check_termination(back: list[Back], starts: Starts, diagnostics: Diagnostics) -> None:
+    """Report on the ways ``back`` of one recursion, of which none is unguarded."""
     edges = [each for each in back if not _draws(each[1])]
-    starts = _Starts(writes, back)
     while edges:
         removed = next((found for found in map(lambda e: _removable(e, edges, starts), edges) if found), None)
         if removed is None:
@@ -51,7 +54,7 @@ def check_termination(back: list[Back], writes: Writes, diagnostics: Diagnostics
         _report(edges, starts, diagnostics)
 
 
-def _report(edges: list[Back], starts: _Starts, diagnostics: Diagnostics) -> None:
+def _report(edges: list[Back], starts: Starts, diagnostics: Diagnostics) -> None:
     for symbol, way in edges:
         for need in needs(way):
             missed = _missed(need, way, edges, starts)
@@ -104,7 +107,7 @@ def _draws(way: Way) -> bool:
     return bool(way.weights) or any(draws(test) for test, _ in way.guards)
 
 
-def _removable(edge: Back, edges: list[Back], starts: _Starts) -> list[Back]:
+def _removable(edge: Back, edges: list[Back], starts: Starts) -> list[Back]:
     """``edge`` and others, if a guard on it shows that it is taken a limited number of times only."""
     for need in needs(edge[1]):
         sides = (
@@ -120,7 +123,7 @@ def _removable(edge: Back, edges: list[Back], starts: _Starts) -> list[Back]:
     return []
 
 
-def _falls(quantity: Form, need: Need, side: str, way: Way, starts: _Starts) -> int | None:
+def _falls(quantity: Form, need: Need, side: str, way: Way, starts: Starts) -> int | None:
     """1 if the way lowers ``quantity`` by at least some amount while it is above 0, 0 if it doesn't raise it."""
     later = form(need.quantity, after(way.operators))
     if side == "<":
@@ -150,7 +153,7 @@ def _falls(quantity: Form, need: Need, side: str, way: Way, starts: _Starts) -> 
 
 
 def _missed(
-    need: Need, way: Way, edges: list[Back], starts: _Starts, meets: bool = False
+    need: Need, way: Way, edges: list[Back], starts: Starts, meets: bool = False
 ) -> tuple[float, float, str, float] | None:
     """For a guard that waits for one value: the start, step, counter and value where the counter misses it; with
     ``meets`` where it does not, from any start."""
@@ -191,32 +194,20 @@ def _meets(start: float, step: float, bound: float) -> bool | None:
     return None
 
 
-class Writes:
-    """What the scene's Calculations give to each parameter: (the operation's id, the constant or None)."""
+class Starts(NamedTuple):
+    """The constants that parameters have where a recursion is entered; None for those that may have something else."""
 
-    def __init__(self, model: Model) -> None:
-        self.seed = seed_of(model)
-        self.of: dict[str, list[tuple[int, float | None]]] = {}
-        for operator in operators_of(model):
-            if isinstance(operator, Calculate):
-                for statement in operator.statements:
-                    if isinstance(statement, Assign):
-                        value = form(statement.value, {})
-                        constant = None if value.factors or value.low != value.high else value.low
-                        self.of.setdefault(statement.parameter, []).append((id(operator), constant))
+    seed: float
+    values: dict[str, tuple[float, ...] | None]
+
+    def of(self, name: str) -> tuple[float, ...] | None:
+        return self.values.get(name)
 
 
-class _Starts:
-    """The constants that parameters have where a recursion is entered."""
-
-    def __init__(self, writes: Writes, back: list[Back]) -> None:
-        self.seed, self._writes = writes.seed, writes
-        self._inside = {id(operator) for _, way in back for operator in way.operators}
-
-    def of(self, name: str) -> list[float] | None:
-        values = [value for operator, value in self._writes.of.get(name, ()) if operator not in self._inside]
-        constants = [value for value in values if value is not None]
-        return constants if values and len(constants) == len(values) else None
+def starts_of(view: View, name: str, inside: frozenset[int]) -> tuple[float, ...] | None:
+    """What operators assign to a parameter, but for those ``inside`` (by their ids); None unless it is all constant."""
+    values = [value for operator, value in view.writes.get(name, ()) if operator not in inside]
+    return tuple(values) if values and None not in values else None  # type: ignore[arg-type]
 
 
 def cyclic(edges: list[Back]) -> list[Back]:

@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Iterable, NamedTuple
+from typing import Any, Callable, Iterable, NamedTuple
 
-from .model import Apply, Assign, Calculate, Constant, Expression, Model, Read
-from .walk import operators_of, reads
+from .model import Apply, Assign, Calculate, Constant, Expression, Read
+from .walk import components, reads
+
+# Memory.ask
+Ask = Callable[..., Any]
 
 _NUMBER = re.compile(r"-?[\d.]+(?:[eE][-+]?\d+)?|(?:\+\+|--).*|.*(?:\+\+|--)\s*;?", re.DOTALL)
 # An end that an assignment still moves after so many rounds is taken to move for ever.
@@ -60,15 +63,36 @@ class Interval(NamedTuple):
 ALL = Interval()
 
 
-def intervals_of(model: Model) -> dict[str, Interval]:
-    """Of each parameter that is assigned: where its values lie."""
-    assigned = [
-        statement
-        for operator in operators_of(model)
-        if isinstance(operator, Calculate)
-        for statement in operator.statements
-        if isinstance(statement, Assign)
-    ]
+def intervals_of(ask: Ask, *calculations: Calculate) -> dict[str, Interval]:
+    """Of each parameter that is assigned: where its values lie. Parameters whose values go round (``n`` in ``--n``, or several
+    through each other) are worked out together, after all that goes into them; what stays the same there isn't followed
+    further."""
+    assigned: dict[str, list[Assign]] = {}
+    for operator in calculations:
+        for name, several in ask(assigns_of, operator).items():
+            assigned.setdefault(name, []).extend(several)
+    found: dict[str, Interval] = {}
+    read = {name: {other for each in several for other in reads(each.value)} for name, several in assigned.items()}
+    for component in components(read):
+        names = sorted(component)
+        outside = sorted({other for name in names for other in read[name] if other not in component and other in found})
+        statements = [each for name in names for each in assigned[name]]
+        found.update(ask(joined_intervals, *statements, given=tuple((name, found[name]) for name in outside)))
+    return found
+
+
+def assigns_of(operator: Calculate) -> dict[str, list[Assign]]:
+    found: dict[str, list[Assign]] = {}
+    for statement in operator.statements:
+        if isinstance(statement, Assign):
+            found.setdefault(statement.parameter, []).append(statement)
+    return found
+
+
+def joined_intervals(*given: Assign | tuple[str, Interval]) -> dict[str, Interval]:
+    """The intervals of the parameters that some statements assign, which need only each other and those that are given."""
+    assigned = [each for each in given if isinstance(each, Assign)]
+    known = dict(each for each in given if not isinstance(each, Assign))
     readers: dict[str, list[Assign]] = {}
     for statement in assigned:
         for name in reads(statement.value):
@@ -78,7 +102,7 @@ def intervals_of(model: Model) -> dict[str, Interval]:
     waiting = assigned[::-1]
     while waiting:
         statement = waiting.pop()
-        name, value = statement.parameter, interval_of(statement.value, found)
+        name, value = statement.parameter, interval_of(statement.value, {**known, **found})
         if value is None:
             continue
         old = found.get(name, value)

@@ -9,7 +9,7 @@ Example::
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Iterator
+from typing import AbstractSet, Iterator, Mapping
 
 from .evaluate import NotFinite, fold
 from .model import (
@@ -19,18 +19,15 @@ from .model import (
     Calculate,
     Choose,
     Constant,
-    Enter,
     Expression,
     Model,
     Operand,
     Operator,
     Paint,
     Prefixed,
-    Primitive,
     Produce,
     Production,
     Read,
-    Step,
     Sum,
     Transform,
 )
@@ -106,59 +103,6 @@ def expressions_of(operator: Operator) -> Iterator[Expression]:
             yield from entry
 
 
-def operators_of(model: Model) -> Iterator[Operator]:
-    """Every operator of the scene, each once."""
-    seen: set[int] = set()
-    for way in all_ways(model):
-        for operator in way.operators:
-            if id(operator) not in seen:
-                seen.add(id(operator))
-                yield operator
-
-
-def all_ways(model: Model) -> Iterator[Way]:
-    for placed in model.objects:
-        yield from ways(placed.body)  # type: ignore[arg-type]
-    for symbol in model.symbols.values():
-        yield from ways(symbol.production)
-
-
-def steps_of(model: Model) -> Iterator[Step]:
-    for operator in operators_of(model):
-        if isinstance(operator, Transform):
-            yield from operator.steps
-
-
-def all_expressions(model: Model) -> Iterator[Expression]:
-    """Every whole expression of the scene, each once."""
-    seen: set[int] = set()
-
-    def fresh(expression: Expression) -> bool:
-        new = id(expression) not in seen
-        seen.add(id(expression))
-        return new
-
-    for operator in operators_of(model):
-        yield from filter(fresh, expressions_of(operator))
-    for way in all_ways(model):
-        yield from filter(fresh, (test for test, _ in way.guards))
-        yield from filter(fresh, way.weights)
-        if isinstance(way.leaf, Primitive):
-            yield from filter(fresh, way.leaf.arguments)
-
-
-def reached_symbols(model: Model) -> set[str]:
-    """The symbols that the scene's objects lead to, guards ignored."""
-    found: set[str] = set()
-    waiting = [way.leaf for placed in model.objects for way in ways(placed.body)]  # type: ignore[arg-type]
-    while waiting:
-        leaf = waiting.pop()
-        if isinstance(leaf, Enter) and leaf.symbol not in found and leaf.symbol in model.symbols:
-            found.add(leaf.symbol)
-            waiting += [way.leaf for way in ways(model.symbols[leaf.symbol].production)]
-    return found
-
-
 def decided(test: Expression, seed: float) -> bool | None:
     """Whether a guard is always true or always false, where that can be told: constants, and draws (which are in
     [0, 1)) compared with a constant outside of their range."""
@@ -195,11 +139,12 @@ def seed_of(model: Model) -> float:
     return dict(model.settings.values).get("seed", (0.0,))[0] if model.settings is not None else 0.0
 
 
-def components(edges: dict[str, set[str]]) -> list[frozenset[str]]:
+def components(edges: Mapping[str, AbstractSet[str]]) -> list[frozenset[str]]:
     """The strongly connected components (Tarjan 1972), without recursion so that long chains are fine."""
     order: dict[str, int] = {}
     low: dict[str, int] = {}
     stack: list[str] = []
+    on_stack: set[str] = set()
     found: list[frozenset[str]] = []
     for root in edges:
         if root in order:
@@ -207,6 +152,7 @@ def components(edges: dict[str, set[str]]) -> list[frozenset[str]]:
         work = [(root, iter(sorted(edges[root])))]
         order[root] = low[root] = len(order)
         stack.append(root)
+        on_stack.add(root)
         while work:
             name, successors = work[-1]
             for other in successors:
@@ -215,16 +161,19 @@ def components(edges: dict[str, set[str]]) -> list[frozenset[str]]:
                 if other not in order:
                     order[other] = low[other] = len(order)
                     stack.append(other)
+                    on_stack.add(other)
                     work.append((other, iter(sorted(edges[other]))))
                     break
-                if other in stack:
+                if other in on_stack:
                     low[name] = min(low[name], order[other])
             else:
                 work.pop()
                 if work:
                     low[work[-1][0]] = min(low[work[-1][0]], low[name])
                 if low[name] == order[name]:
-                    at = stack.index(name)
-                    found.append(frozenset(stack[at:]))
-                    del stack[at:]
+                    members: set[str] = set()
+                    while name not in members:
+                        members.add(stack.pop())
+                    on_stack -= members
+                    found.append(frozenset(members))
     return found

@@ -1,0 +1,151 @@
+"""A model as the checks look at it: its productions, its operators, and what was found out about each.
+
+What a check asks of a single node goes through ``ask`` (memory.py), so that after an edit it is known of all nodes that
+are still there; what a check does for the whole scene goes over answers, not over expressions.
+
+Example::
+
+    view = View(model, Memory())
+    for way in view.ways(model.symbols["Tree"].production): …
+    view.assignments["n"]           # all Assigns to 'n'
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from .intervals import Interval, intervals_of
+from .linear import form
+from .memory import Memory
+from .model import Assign, Calculate, Enter, Expression, Model, Operator, Primitive, Production
+from .walk import Way, expressions_of, reads, seed_of, ways
+
+
+class Uses(NamedTuple):
+    """What an operator or a production does with parameters. ``feeds``: (parameter, what the value assigned to it reads);
+    ``read``: what all else reads."""
+
+    read: frozenset[str]
+    feeds: tuple[tuple[str, frozenset[str]], ...] = ()
+
+
+class View:
+    def __init__(self, model: Model, memory: Memory) -> None:
+        self.model, self.ask, self.seed = model, memory.ask, seed_of(model)
+        self.productions: list[Production] = [placed.body for placed in model.objects]  # type: ignore[misc]
+        self.productions += [symbol.production for symbol in model.symbols.values()]
+
+    def ways(self, production: Production) -> tuple[Way, ...]:
+        return self.ask(ways_of, production)
+
+    def entered(self, production: Production) -> frozenset[str]:
+        """The symbols that a production leads to."""
+        return self.ask(entered_by, production)
+
+    @cached_property
+    def operators(self) -> list[Operator]:
+        """Every operator of the scene, each once."""
+        found = {id(each): each for production in self.productions for each in self.ask(operators_in, production)}
+        return list(found.values())
+
+    @cached_property
+    def calculations(self) -> list[Calculate]:
+        return [operator for operator in self.operators if isinstance(operator, Calculate)]
+
+    @cached_property
+    def assignments(self) -> dict[str, list[Assign]]:
+        found: dict[str, list[Assign]] = {}
+        for operator in self.calculations:
+            for statement in operator.statements:
+                if isinstance(statement, Assign):
+                    found.setdefault(statement.parameter, []).append(statement)
+        return found
+
+    @cached_property
+    def writes(self) -> dict[str, list[tuple[int, float | None]]]:
+        """What operators assign to each parameter: (the operator's id, the constant or None)."""
+        found: dict[str, list[tuple[int, float | None]]] = {}
+        for operator in self.calculations:
+            for name, value in self.ask(constants_of, operator):
+                found.setdefault(name, []).append((id(operator), value))
+        return found
+
+    @cached_property
+    def intervals(self) -> dict[str, Interval]:
+        """Where the values of each assigned parameter lie."""
+        return self.ask(_intervals_of, *self.calculations, given=(self.ask,))
+
+    @cached_property
+    def reached(self) -> set[str]:
+        """The symbols that the scene's objects lead to, guards ignored."""
+        symbols, found = self.model.symbols, set()
+        waiting = [name for placed in self.model.objects for name in self.entered(placed.body)]  # type: ignore[arg-type]
+        while waiting:
+            name = waiting.pop()
+            if name not in found and name in symbols:
+                found.add(name)
+                waiting += self.entered(symbols[name].production)
+        return found
+
+    @cached_property
+    def uses(self) -> list[Uses]:
+        """What operators and productions do with parameters."""
+        found = [self.ask(uses_of_operator, operator) for operator in self.operators]
+        return found + [self.ask(uses_of_production, production) for production in self.productions]
+
+
+# --- questions
+
+
+def _intervals_of(*given: Any) -> dict[str, Interval]:
+    *calculations, ask = given
+    return intervals_of(ask, *calculations)
+
+
+def ways_of(production: Production) -> tuple[Way, ...]:
+    return tuple(ways(production))
+
+
+def entered_by(production: Production) -> frozenset[str]:
+    return frozenset(way.leaf.symbol for way in ways(production) if isinstance(way.leaf, Enter))
+
+
+def operators_in(production: Production) -> tuple[Operator, ...]:
+    return tuple({id(each): each for way in ways(production) for each in way.operators}.values())
+
+
+def own_expressions(production: Production) -> list[Expression]:
+    """The guards, weights and arguments of primitives of a production, each once."""
+    found: dict[int, Expression] = {}
+    for way in ways(production):
+        several = [test for test, _ in way.guards]
+        several += way.weights
+        several += way.leaf.arguments if isinstance(way.leaf, Primitive) else ()
+        found.update((id(each), each) for each in several)
+    return list(found.values())
+
+
+def constants_of(operator: Calculate) -> tuple[tuple[str, float | None], ...]:
+    """The parameters that an operator assigns, with the constant that they get; None for another value."""
+    assigns = [each for each in operator.statements if isinstance(each, Assign)]
+    forms = ((each.parameter, form(each.value, {})) for each in assigns)
+    return tuple((name, None if value.factors or value.low != value.high else value.low) for name, value in forms)
+
+
+def guards_read(production: Production) -> tuple[str, ...]:
+    """The parameters that a production's guards read, sorted."""
+    return tuple(sorted({name for way in ways(production) for test, _ in way.guards for name in reads(test)}))
+
+
+def uses_of_operator(operator: Operator) -> Uses:
+    if not isinstance(operator, Calculate):
+        return Uses(frozenset().union(*map(reads, expressions_of(operator))))
+    assigns = [each for each in operator.statements if isinstance(each, Assign)]
+    others = [each.count for each in operator.statements if not isinstance(each, Assign)]
+    feeds = tuple((each.parameter, reads(each.value)) for each in assigns)
+    return Uses(frozenset().union(*map(reads, others)), feeds)
+
+
+def uses_of_production(production: Production) -> Uses:
+    return Uses(frozenset().union(*map(reads, own_expressions(production))))
