@@ -31,6 +31,10 @@
 #define REST_OF_A_RAY(primitives) fmax(1.0, 0.3 * log2(1.0 + (primitives)) - 1.2)
 /* A doubling of memory must win 7 %: 2^-0.1 = 0.93. */
 #define MEMORY_EXPONENT 0.1
+/* Of two plans whose costs differ by less, which is what estimates are worth, the one with fewer fronts is better. */
+#define SAME_COST 1.01
+/* Items that are counted in looking for fewer fronts: some milliseconds. */
+#define MERGE_ITEMS 5e5
 
 /* Opening anything adds more bytes than this, or nothing. */
 #define LEAST_STEP 1.0
@@ -39,7 +43,7 @@
  * larger still isn't seen. */
 #define COARSE_ZOOM 4096.0
 
-enum { PRICES = 48 };
+enum { PRICES = 48, MERGE_ROUNDS = 4 };
 
 static bool occurs(const pl_states *states, const pl_item *item)
 {
@@ -328,15 +332,21 @@ static double time_of(const pl_front_plan *plan, const outcome *out)
     return out->entries + REST_OF_A_RAY((double)plan->compositions->states->list[0].primitives);
 }
 
+/* What plans are compared by, the least is best; time alone where memory is to be filled. */
+static double cost_of(const pl_front_plan *plan, const outcome *out, bool fill)
+{
+    return time_of(plan, out) * (fill ? 1.0 : pow(out->bytes, MEMORY_EXPONENT));
+}
+
 /* Lower prices from one that is too high for anything, until they no longer fit into `most` bytes. *best: with `fill`
- * the lowest that fits; else the one with the least time · memory^MEMORY_EXPONENT. closed: the outcome of the first. */
+ * the lowest that fits; else the one that costs least. closed: the outcome of the first. */
 static bool find_price(pl_front_plan *plan, const outcome *closed, double most, bool fill, double *best)
 {
     double least = INFINITY, fits = closed->entries / LEAST_STEP, too_low = 0.0;
     outcome out = *closed;
     for (int i = 0; i < PRICES && out.instances; i++) {
         if (out.whole) {
-            const double score = fill ? fits : time_of(plan, &out) * pow(out.bytes, MEMORY_EXPONENT);
+            const double score = fill ? fits : cost_of(plan, &out, false);
             if (score < least) {
                 least = score;
                 *best = fits;
@@ -350,6 +360,50 @@ static bool find_price(pl_front_plan *plan, const outcome *closed, double most, 
     return true;
 }
 
+/* A price weighs openings one by one. That a front is gone once none of its instances is closed it doesn't see, nor that
+ * few kinds of instances that fill their boxes are better than many that overlap. So states that have fronts are tried one
+ * after another, the smallest first: opened always, at the same price. *merged: some are now. */
+static bool merge_fronts(pl_front_plan *plan, double price, double most, bool fill, bool *merged)
+{
+    const pl_states *states = plan->compositions->states;
+    outcome out;
+    if (!try_price(plan, price, most, &out)) return false;
+    double least = cost_of(plan, &out, fill), items = 0.0;
+    *merged = false;
+    for (uint32_t i = states->count; --i > 0 && items < MERGE_ITEMS;) {
+        const uint32_t state = plan->order[i];
+        if (!(plan->visits[state] > 0.0) || plan->price_free[state] || states->list[state].endless) continue;
+        plan->price_free[state] = true;
+        find_bytes(plan);
+        if (!try_price(plan, price, most, &out)) return false;
+        const double cost = cost_of(plan, &out, fill);
+        items += out.bytes / PRIMITIVE_BYTES + (double)plan->compositions->first[states->count];
+        if (out.whole && cost < SAME_COST * least) {
+            least = fmin(least, cost);
+            *merged = true;
+            continue;
+        }
+        plan->price_free[state] = false;
+        find_bytes(plan);
+        if (!try_price(plan, price, most, &out)) return false;
+    }
+    return true;
+}
+
+/* The best price, and the states that are opened always at it. That of the round before stays where with these nothing higher
+ * fits. */
+static bool find_plan(pl_front_plan *plan, double most, bool fill, double *best)
+{
+    outcome closed;
+    bool merged = true;
+    for (int i = 0; i < MERGE_ROUNDS && merged; i++) {
+        if (!try_price(plan, INFINITY, most, &closed)) return false;
+        if (closed.whole && !find_price(plan, &closed, most, fill, best)) return false;
+        if (!merge_fronts(plan, *best, most, fill, &merged)) return false;
+    }
+    return true;
+}
+
 bool pl_front_plan_budget(pl_front_plan *plan, double budget, bool fill, double *floor, bool *fits, pl_error *error)
 {
     outcome out;
@@ -358,12 +412,11 @@ bool pl_front_plan_budget(pl_front_plan *plan, double budget, bool fill, double 
     *floor = out.bytes;
     *fits = ok && out.bytes <= budget;
     if (*fits) {
-        const outcome closed = out;
         const double whole = (double)plan->compositions->states->list[0].primitives * PRIMITIVE_BYTES;
         out.whole = false;
         if (whole <= budget) ok = try_price(plan, -1.0, budget, &out);
         if (out.whole) best = -1.0;
-        else ok = ok && find_price(plan, &closed, budget, fill, &best);
+        else ok = ok && find_plan(plan, budget, fill, &best);
     }
     ok = ok && try_price(plan, best, INFINITY, &out);
     plan->estimate = out.bytes;

@@ -212,6 +212,18 @@ def test_what_pays_is_opened_and_no_more():
         assert less.statistics["front"]["entries"] > front["entries"] > 0
 
 
+def test_fronts_that_are_not_needed_are_opened_for_good():
+    """A sponge of level 4 by default: sponges of level 2 in one, no plates and rows between; a ray enters about one of them."""
+    data = compile(ROOT / "scenes" / "menger.plsys", parameters={"level": 4})
+    random = np.random.default_rng(2)
+    targets = random.uniform(0, 1, (2000, 3))
+    origins = targets + random.normal(size=targets.shape) * 3
+    with Scene(data) as scene:
+        assert scene.statistics["front"]["count"] <= 4
+        scene.intersect(origins, targets - origins)
+        assert scene.statistics["instances"] < 1.2 * len(targets)
+
+
 def test_what_occurs_once_needs_no_front():
     """A forest's ten thousand places stand in the scene's own front."""
     data = compile(ROOT / "scenes" / "forest.plsys", parameters={"order": 4})
