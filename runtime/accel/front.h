@@ -67,8 +67,8 @@ typedef struct pl_front_instance {
     uint32_t front;       /* | PL_NO_SHADOW */
 } pl_front_instance;
 
-/* What the rounding of L lost. Scenes have it where an error in one unit frame would be seen in those far below, which
- * are magnified a great deal. */
+/* What the rounding of L lost. Fronts have it where an error in the unit frame of an instance would be seen in those far
+ * below, which are magnified a great deal. */
 typedef struct pl_front_fine {
     float columns[3 * 3];
 } pl_front_fine;
@@ -223,7 +223,7 @@ typedef struct pl_front_plan {
     uint32_t *front_of;   /* state -> front + 1; for the builder's use */
     double *bytes;        /* of a copy of a state, less the instance that it replaces */
     bool *price_free;     /* opened always: one item, or but one place */
-    bool fine;            /* the fronts' instances have pl_front_fine */
+    bool *fine;           /* the instances of a state's front have pl_front_fine */
     float *probability;   /* of entering an item from its state, by composition */
     double *visits;       /* of each front, a ray */
     double *threshold;    /* of each front: probability a byte */

@@ -432,9 +432,9 @@ bool pl_front_open(const pl_front_plan *plan, const pl_front *front, int threads
                               .opened_count = counts->opened,
                               .box_count = counts->primitives + counts->instances};
     items->primitives = allocate(items->primitive_count, sizeof *items->primitives);
-    items->instances = allocate(items->instance_count, pl_front_instance_bytes(plan->fine));
+    items->instances = allocate(items->instance_count, pl_front_instance_bytes(plan->fine[front->state]));
     items->places = (pl_front_place *)(items->instances + items->instance_count);
-    items->fine = plan->fine ? (pl_front_fine *)(items->places + items->instance_count) : NULL;
+    items->fine = plan->fine[front->state] ? (pl_front_fine *)(items->places + items->instance_count) : NULL;
     items->opened = malloc(items->opened_count * sizeof *items->opened);
     items->boxes = allocate(items->box_count, sizeof *items->boxes);
     bool ok = items->primitives && items->instances && items->opened && items->boxes;

@@ -24,13 +24,15 @@
 /* A primitive's share of nodes: about 7 of eight children are there, one of them a node. */
 #define NODE_BYTES_AN_ITEM (sizeof(pl_front_node) / 5.8)
 #define PRIMITIVE_BYTES (sizeof(pl_front_primitive) + NODE_BYTES_AN_ITEM)
-#define INSTANCE_BYTES(plan) ((double)pl_front_instance_bytes((plan)->fine) + NODE_BYTES_AN_ITEM)
+#define INSTANCE_BYTES(fine) ((double)pl_front_instance_bytes(fine) + NODE_BYTES_AN_ITEM)
 #define PRIOR_VISITS 8.0
 
 /* Time besides instances, in instances: a ray of a flat scene takes about as long as entering so many (measured). */
 #define REST_OF_A_RAY(primitives) fmax(1.0, 0.3 * log2(1.0 + (primitives)) - 1.2)
 /* A doubling of memory must win 7 %: 2^-0.1 = 0.93. */
 #define MEMORY_EXPONENT 0.1
+/* That of fronts and as much as this, which rays take anyway: where there is less, doubling it is no matter. */
+#define MEMORY_BESIDE 65536.0
 /* Of two plans whose costs differ by less, which is what estimates are worth, the one with fewer fronts is better. */
 #define SAME_COST 1.01
 /* Items that are counted in looking for fewer fronts: some milliseconds. */
@@ -41,7 +43,7 @@
 
 /* Rounding an instance's map moves points by some 2^-23 in its unit frame. What this becomes in frames that are so many times
  * larger still isn't seen. */
-#define COARSE_ZOOM 4096.0
+#define COARSE_ZOOM 8192.0
 
 enum { PRICES = 48, MERGE_ROUNDS = 4 };
 
@@ -108,16 +110,34 @@ static double find_zoom(const pl_front_plan *plan, const double *zoom, uint32_t 
     return largest;
 }
 
-/* Whether single precision isn't enough for the maps of instances. false: no memory. */
+/* The largest of that for instances in a front of the state, whatever is opened there; below: of the fronts of states that are
+ * less deep. */
+static double find_below(const pl_front_plan *plan, const double *zoom, const double *below, uint32_t index)
+{
+    const pl_states *states = plan->compositions->states;
+    const pl_state *state = &states->list[index];
+    double largest = 0.0;
+    if (state->endless) return INFINITY;
+    for (uint32_t k = 0; k < state->item_count; k++) {
+        const pl_item *item = &state->items[k];
+        if (item->kind != PL_NODE_ENTER || !occurs(states, item)) continue;
+        largest = fmax(largest, fmax(below[item->what], plan->price_free[item->what] ? 0.0 : zoom[item->what]));
+    }
+    return largest;
+}
+
+/* Where single precision isn't enough for the maps of instances. false: no memory. */
 static bool find_fine(pl_front_plan *plan)
 {
     const uint32_t count = plan->compositions->states->count;
-    double *zoom = malloc(count * sizeof *zoom);
+    double *zoom = malloc(2 * (size_t)count * sizeof *zoom);
     if (!zoom) return false;
-    for (uint32_t i = count; i-- > 1;) {
+    double *below = zoom + count;
+    for (uint32_t i = count; i-- > 0;) {
         const uint32_t index = plan->order[i];
         zoom[index] = find_zoom(plan, zoom, index);
-        plan->fine = plan->fine || (!plan->price_free[index] && !(zoom[index] <= COARSE_ZOOM));
+        below[index] = find_below(plan, zoom, below, index);
+        plan->fine[index] = !(below[index] <= COARSE_ZOOM);
     }
     free(zoom);
     return true;
@@ -131,14 +151,15 @@ static void find_bytes(pl_front_plan *plan)
     for (uint32_t i = states->count; i-- > 0;) {
         const uint32_t index = plan->order[i];
         const pl_state *state = &states->list[index];
+        const double instance_bytes = INSTANCE_BYTES(plan->fine[index]);
         double bytes = sizeof(pl_opened);
         for (uint32_t k = 0; k < state->item_count; k++) {
             const pl_item *item = &state->items[k];
             if (!occurs(states, item)) continue;
             if (item->kind != PL_NODE_ENTER) bytes += PRIMITIVE_BYTES;
-            else bytes += INSTANCE_BYTES(plan) + (plan->price_free[item->what] ? plan->bytes[item->what] : 0.0);
+            else bytes += instance_bytes + (plan->price_free[item->what] ? plan->bytes[item->what] : 0.0);
         }
-        plan->bytes[index] = fmax(bytes - INSTANCE_BYTES(plan), 1.0);
+        plan->bytes[index] = fmax(bytes - instance_bytes, 1.0);
     }
 }
 
@@ -178,9 +199,10 @@ pl_front_plan *pl_front_plan_create(const pl_compositions *compositions, const p
         plan->visits = malloc(count * sizeof *plan->visits);
         plan->threshold = malloc(count * sizeof *plan->threshold);
         plan->counts = calloc(count, sizeof *plan->counts);
+        plan->fine = calloc(count, sizeof *plan->fine);
         plan->probability = calloc(compositions->first[count] + 1, sizeof *plan->probability);
         if (plan->order && plan->front_of && plan->bytes && plan->price_free && plan->visits && plan->threshold &&
-            plan->counts && plan->probability && sort_states(plan)) {
+            plan->counts && plan->fine && plan->probability && sort_states(plan)) {
             find_free(plan, once_is_free);
             if (find_fine(plan)) {
                 find_bytes(plan);
@@ -205,6 +227,7 @@ void pl_front_plan_free(pl_front_plan *plan)
     free(plan->threshold);
     free(plan->probability);
     free(plan->counts);
+    free(plan->fine);
     free(plan->counting.stack);
     free(plan);
 }
@@ -287,10 +310,10 @@ bool pl_front_plan_count(const pl_front_plan *plan, pl_front_counting *counting,
                        counts);
 }
 
-static double bytes_of(const pl_front_plan *plan, const pl_front_counts *counts)
+static double bytes_of(const pl_front_plan *plan, uint32_t state, const pl_front_counts *counts)
 {
     return sizeof(pl_front) + 5 * 32.0 + (double)counts->primitives * PRIMITIVE_BYTES +
-           (double)counts->instances * INSTANCE_BYTES(plan) + (double)counts->opened * sizeof(pl_opened);
+           (double)counts->instances * INSTANCE_BYTES(plan->fine[state]) + (double)counts->opened * sizeof(pl_opened);
 }
 
 /* --- all fronts at a price --- */
@@ -318,7 +341,7 @@ static bool try_price(pl_front_plan *plan, double price, double enough, outcome 
                          plan->visits[state], plan->visits, &counts))
             return false;
         plan->counts[state] = counts;
-        out->bytes += bytes_of(plan, &counts);
+        out->bytes += bytes_of(plan, state, &counts);
         out->instances += counts.instances;
         if (i > 0) out->entries += plan->visits[state];
         out->whole = counts.whole && out->bytes <= enough;
@@ -335,7 +358,7 @@ static double time_of(const pl_front_plan *plan, const outcome *out)
 /* What plans are compared by, the least is best; time alone where memory is to be filled. */
 static double cost_of(const pl_front_plan *plan, const outcome *out, bool fill)
 {
-    return time_of(plan, out) * (fill ? 1.0 : pow(out->bytes, MEMORY_EXPONENT));
+    return time_of(plan, out) * (fill ? 1.0 : pow(out->bytes + MEMORY_BESIDE, MEMORY_EXPONENT));
 }
 
 /* Lower prices from one that is too high for anything, until they no longer fit into `most` bytes. *best: with `fill`
@@ -457,7 +480,7 @@ bool pl_front_plan_items(pl_front_plan *plan, uint64_t most, pl_error *error)
         ok = (most == UINT64_MAX || limit_front(plan, state, most)) &&
              count_front(plan, state, plan->threshold[state], UINT64_MAX, plan->visits[state], plan->visits, &counts);
         plan->counts[state] = counts;
-        plan->estimate += bytes_of(plan, &counts);
+        plan->estimate += bytes_of(plan, state, &counts);
         if (i > 0) plan->entries += plan->visits[state];
     }
     return ok || pl_fail_memory(error, "planning the fronts");
