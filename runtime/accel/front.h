@@ -9,7 +9,7 @@
  * K and budget never show in a hit. A path through a front is told by *opened* nodes: each is a state that was opened,
  * with the item of its parent by which it was reached.
  *
- *     front_pilot.c  rays -> visits      front_plan.c  visits, budget -> what is opened where
+ *     front_pilot.c  rays -> visits      front_plan.c, front_levels.c  visits, budget -> what is opened where
  *     front_open.c   state -> items      front_tree.c  items -> nodes      front.c  all fronts
  *     front_pyramid.c  many rays of the eye at once
  *
@@ -222,7 +222,8 @@ typedef struct pl_front_plan {
     uint32_t *order;      /* states, each before those that it enters */
     uint32_t *front_of;   /* state -> front + 1; for the builder's use */
     double *bytes;        /* of a copy of a state, less the instance that it replaces */
-    bool *price_free;     /* opened always: one item, or but one place */
+    bool *single;         /* of one item, or in but one place: opened always */
+    bool *price_free;     /* opened always: these, and where fronts are on some levels only, the others */
     bool *fine;           /* the instances of a state's front have pl_front_fine */
     float *probability;   /* of entering an item from its state, by composition */
     double *visits;       /* of each front, a ray */
@@ -230,7 +231,13 @@ typedef struct pl_front_plan {
     double estimate, entries; /* bytes; instances that a ray enters */
     pl_front_counts *counts;  /* of each front */
     pl_front_counting counting;
+    const struct pl_front_levels *levels; /* to be chosen from at each price; NULL: they are chosen */
 } pl_front_plan;
+
+/* Bytes of primitives and instances in fronts, with their shares of nodes; of fronts besides. */
+double pl_front_primitive_bytes(void);
+double pl_front_instance_share(bool fine);
+#define PL_FRONT_BYTES (sizeof(pl_front) + 5 * 32.0)
 
 /* pilot may be NULL. once_is_free: what occurs once is always opened. */
 pl_front_plan *pl_front_plan_create(const pl_compositions *compositions, const pl_pilot *pilot, bool once_is_free,
@@ -266,6 +273,16 @@ double pl_front_scale(const pl_states *states, uint32_t state);
 /* Sets what of a front follows from its state's box and reach: the unit frame, in which the box of the bounded items is centred
  * and scaled to [-1, 1], and the slack. */
 void pl_front_set_frame(pl_front *front, const pl_states *states, uint32_t state);
+
+/* --- front_levels.c --- */
+
+/* What fronts of states would take that are opened from one level to another. visits: of all states, nothing opened. NULL:
+ * no memory, or too many levels to choose from. */
+typedef struct pl_front_levels pl_front_levels;
+pl_front_levels *pl_front_levels_create(const pl_front_plan *plan);
+
+/* Chooses levels at a price: the states of all others are price_free. */
+void pl_front_levels_choose(const pl_front_levels *levels, double price, pl_front_plan *plan);
 
 /* --- front_tree.c --- */
 

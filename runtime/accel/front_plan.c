@@ -10,7 +10,8 @@
  *
  * Parents are deeper than their children (pl_state.depth), so one pass in this order knows every front's v before it looks
  * at the front. The price is found by trying: lower ones until the memory is used up, or until a doubling of the memory no
- * longer wins 7 %. What occurs once is opened always, since that copies nothing.
+ * longer wins 7 %. A price doesn't see that a front whose state is opened everywhere is gone: on which levels there are fronts
+ * at all is chosen before (front_levels.c). What occurs once is opened always, since that copies nothing.
  *
  * p comes from the pilot's rays, and from areas where they haven't been: (entries + K·area share) / (visits + K). */
 #include "front.h"
@@ -33,10 +34,6 @@
 #define MEMORY_EXPONENT 0.1
 /* That of fronts and as much as this, which rays take anyway: where there is less, doubling it is no matter. */
 #define MEMORY_BESIDE 65536.0
-/* Of two plans whose costs differ by less, which is what estimates are worth, the one with fewer fronts is better. */
-#define SAME_COST 1.01
-/* Items that are counted in looking for fewer fronts: some milliseconds. */
-#define MERGE_ITEMS 5e5
 
 /* Opening anything adds more bytes than this, or nothing. */
 #define LEAST_STEP 1.0
@@ -45,7 +42,7 @@
  * larger still isn't seen. */
 #define COARSE_ZOOM 8192.0
 
-enum { PRICES = 48, MERGE_ROUNDS = 4 };
+enum { PRICES = 48 };
 
 static bool occurs(const pl_states *states, const pl_item *item)
 {
@@ -88,7 +85,7 @@ static void find_free(pl_front_plan *plan, bool once_is_free)
         const pl_state *state = &states->list[i];
         uint32_t live = 0;
         for (uint32_t k = 0; k < state->item_count; k++) live += occurs(states, &state->items[k]);
-        plan->price_free[i] = (live <= 1 && !state->endless) || references[i] == 1;
+        plan->single[i] = plan->price_free[i] = (live <= 1 && !state->endless) || references[i] == 1;
     }
     memset(references, 0, states->count * sizeof *references);
 }
@@ -195,14 +192,15 @@ pl_front_plan *pl_front_plan_create(const pl_compositions *compositions, const p
         plan->order = malloc(count * sizeof *plan->order);
         plan->front_of = calloc(count, sizeof *plan->front_of);
         plan->bytes = calloc(count, sizeof *plan->bytes);
+        plan->single = calloc(count, sizeof *plan->single);
         plan->price_free = calloc(count, sizeof *plan->price_free);
         plan->visits = malloc(count * sizeof *plan->visits);
         plan->threshold = malloc(count * sizeof *plan->threshold);
         plan->counts = calloc(count, sizeof *plan->counts);
         plan->fine = calloc(count, sizeof *plan->fine);
         plan->probability = calloc(compositions->first[count] + 1, sizeof *plan->probability);
-        if (plan->order && plan->front_of && plan->bytes && plan->price_free && plan->visits && plan->threshold &&
-            plan->counts && plan->fine && plan->probability && sort_states(plan)) {
+        if (plan->order && plan->front_of && plan->bytes && plan->single && plan->price_free && plan->visits &&
+            plan->threshold && plan->counts && plan->fine && plan->probability && sort_states(plan)) {
             find_free(plan, once_is_free);
             if (find_fine(plan)) {
                 find_bytes(plan);
@@ -222,6 +220,7 @@ void pl_front_plan_free(pl_front_plan *plan)
     free(plan->order);
     free(plan->front_of);
     free(plan->bytes);
+    free(plan->single);
     free(plan->price_free);
     free(plan->visits);
     free(plan->threshold);
@@ -230,6 +229,16 @@ void pl_front_plan_free(pl_front_plan *plan)
     free(plan->fine);
     free(plan->counting.stack);
     free(plan);
+}
+
+double pl_front_primitive_bytes(void)
+{
+    return PRIMITIVE_BYTES;
+}
+
+double pl_front_instance_share(bool fine)
+{
+    return INSTANCE_BYTES(fine);
 }
 
 double pl_front_plan_flat_bytes(void)
@@ -312,7 +321,7 @@ bool pl_front_plan_count(const pl_front_plan *plan, pl_front_counting *counting,
 
 static double bytes_of(const pl_front_plan *plan, uint32_t state, const pl_front_counts *counts)
 {
-    return sizeof(pl_front) + 5 * 32.0 + (double)counts->primitives * PRIMITIVE_BYTES +
+    return PL_FRONT_BYTES + (double)counts->primitives * PRIMITIVE_BYTES +
            (double)counts->instances * INSTANCE_BYTES(plan->fine[state]) + (double)counts->opened * sizeof(pl_opened);
 }
 
@@ -329,6 +338,10 @@ static bool try_price(pl_front_plan *plan, double price, double enough, outcome 
 {
     const uint32_t count = plan->compositions->states->count;
     *out = (outcome){.whole = true};
+    if (plan->levels && price > 0.0) {
+        pl_front_levels_choose(plan->levels, price, plan);
+        find_bytes(plan);
+    }
     for (uint32_t i = 0; i < count; i++) plan->visits[i] = 0.0;
     plan->visits[0] = 1.0;
     for (uint32_t i = 0; i < count; i++) {
@@ -361,70 +374,55 @@ static double cost_of(const pl_front_plan *plan, const outcome *out, bool fill)
     return time_of(plan, out) * (fill ? 1.0 : pow(out->bytes + MEMORY_BESIDE, MEMORY_EXPONENT));
 }
 
-/* Lower prices from one that is too high for anything, until they no longer fit into `most` bytes. *best: with `fill`
- * the lowest that fits; else the one that costs least. closed: the outcome of the first. */
-static bool find_price(pl_front_plan *plan, const outcome *closed, double most, bool fill, double *best)
+/* A price and what comes of it. */
+typedef struct choice {
+    double price, cost;
+} choice;
+
+/* Lower prices from one that fits, until they no longer fit into `most` bytes: the one that costs least. first: the outcome of
+ * the first. */
+static bool find_price(pl_front_plan *plan, double price, const outcome *first, double most, bool fill, choice *best)
 {
-    double least = INFINITY, fits = closed->entries / LEAST_STEP, too_low = 0.0;
-    outcome out = *closed;
-    for (int i = 0; i < PRICES && out.instances; i++) {
+    double fits = price, too_low = 0.0;
+    outcome out = *first;
+    *best = (choice){price, INFINITY};
+    for (int i = 0; i < PRICES; i++) {
         if (out.whole) {
-            const double score = fill ? fits : cost_of(plan, &out, false);
-            if (score < least) {
-                least = score;
-                *best = fits;
-            }
+            const double cost = cost_of(plan, &out, fill);
+            if (cost < best->cost) *best = (choice){price, cost};
+            fits = price;
+        } else {
+            too_low = price;
         }
-        if (too_low > 0.0 && fits < 1.1 * too_low) break;
-        const double price = too_low > 0.0 ? sqrt(fits * too_low) : fits / (fill ? 4.0 : 2.0);
+        if (out.instances == 0 || (too_low > 0.0 && fits < 1.1 * too_low)) break;
+        price = too_low > 0.0 ? sqrt(fits * too_low) : fits / (fill ? 4.0 : 2.0);
         if (!try_price(plan, price, most, &out)) return false;
-        *(out.whole ? &fits : &too_low) = price;
     }
     return true;
 }
 
-/* A price weighs openings one by one. That a front is gone once none of its instances is closed it doesn't see, nor that
- * few kinds of instances that fill their boxes are better than many that overlap. So states that have fronts are tried one
- * after another, the smallest first: opened always, at the same price. *merged: some are now. */
-static bool merge_fronts(pl_front_plan *plan, double price, double most, bool fill, bool *merged)
+/* Fronts on all levels or on some, whichever is better, at the best price. closed: with nothing opened. */
+static bool find_plan(pl_front_plan *plan, const pl_front_levels *levels, const outcome *closed, double most, bool fill,
+                      double *price)
 {
-    const pl_states *states = plan->compositions->states;
+    choice all, coarse, some = {.cost = INFINITY};
     outcome out;
-    if (!try_price(plan, price, most, &out)) return false;
-    double least = cost_of(plan, &out, fill), items = 0.0;
-    *merged = false;
-    for (uint32_t i = states->count; --i > 0 && items < MERGE_ITEMS;) {
-        const uint32_t state = plan->order[i];
-        if (!(plan->visits[state] > 0.0) || plan->price_free[state] || states->list[state].endless) continue;
-        plan->price_free[state] = true;
+    const double highest = closed->entries / LEAST_STEP;
+    if (!find_price(plan, highest, closed, most, fill, &all)) return false;
+    *price = all.price;
+    if (!levels) return true;
+    plan->levels = levels;
+    bool ok = try_price(plan, highest, most, &out) && find_price(plan, highest, &out, most, fill, &coarse) &&
+              try_price(plan, coarse.price, most, &out);
+    plan->levels = NULL; /* from here on they stay */
+    ok = ok && find_price(plan, coarse.price, &out, most, fill, &some);
+    if (some.cost < all.cost) {
+        *price = some.price;
+    } else {
+        memcpy(plan->price_free, plan->single, plan->compositions->states->count * sizeof *plan->single);
         find_bytes(plan);
-        if (!try_price(plan, price, most, &out)) return false;
-        const double cost = cost_of(plan, &out, fill);
-        items += out.bytes / PRIMITIVE_BYTES + (double)plan->compositions->first[states->count];
-        if (out.whole && cost < SAME_COST * least) {
-            least = fmin(least, cost);
-            *merged = true;
-            continue;
-        }
-        plan->price_free[state] = false;
-        find_bytes(plan);
-        if (!try_price(plan, price, most, &out)) return false;
     }
-    return true;
-}
-
-/* The best price, and the states that are opened always at it. That of the round before stays where with these nothing higher
- * fits. */
-static bool find_plan(pl_front_plan *plan, double most, bool fill, double *best)
-{
-    outcome closed;
-    bool merged = true;
-    for (int i = 0; i < MERGE_ROUNDS && merged; i++) {
-        if (!try_price(plan, INFINITY, most, &closed)) return false;
-        if (closed.whole && !find_price(plan, &closed, most, fill, best)) return false;
-        if (!merge_fronts(plan, *best, most, fill, &merged)) return false;
-    }
-    return true;
+    return ok;
 }
 
 bool pl_front_plan_budget(pl_front_plan *plan, double budget, bool fill, double *floor, bool *fits, pl_error *error)
@@ -435,11 +433,14 @@ bool pl_front_plan_budget(pl_front_plan *plan, double budget, bool fill, double 
     *floor = out.bytes;
     *fits = ok && out.bytes <= budget;
     if (*fits) {
+        const outcome closed = out;
+        pl_front_levels *levels = pl_front_levels_create(plan);
         const double whole = (double)plan->compositions->states->list[0].primitives * PRIMITIVE_BYTES;
         out.whole = false;
         if (whole <= budget) ok = try_price(plan, -1.0, budget, &out);
         if (out.whole) best = -1.0;
-        else ok = ok && find_plan(plan, budget, fill, &best);
+        else ok = ok && find_plan(plan, levels, &closed, budget, fill, &best);
+        free(levels);
     }
     ok = ok && try_price(plan, best, INFINITY, &out);
     plan->estimate = out.bytes;

@@ -224,6 +224,18 @@ def test_fronts_that_are_not_needed_are_opened_for_good():
         assert scene.statistics["instances"] < 1.2 * len(targets)
 
 
+def test_few_tall_fronts_stand_for_many_low_ones():
+    """A tree of 20 levels has as many states; under a budget only every seventh or so needs a front, and all that is between
+    stands opened. A ray then enters a sixth of the instances of the graph."""
+    data = compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 20})
+    with Scene(data, memory=128 * 1024) as scene, Scene(data, front_items=1) as graph:
+        assert scene.statistics["front"]["count"] <= 4 < 20 <= graph.statistics["front"]["count"]
+        origins, directions = rays(compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 8}), 300, 5)
+        for ours, theirs in zip(scene.intersect(origins, directions), graph.intersect(origins, directions)):
+            np.testing.assert_array_equal(ours, theirs)
+        assert scene.statistics["instances"] < graph.statistics["instances"] / 6
+
+
 def test_what_occurs_once_needs_no_front():
     """A forest's ten thousand places stand in the scene's own front."""
     data = compile(ROOT / "scenes" / "forest.plsys", parameters={"order": 4})
