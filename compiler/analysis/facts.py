@@ -30,12 +30,14 @@ INCREMENTAL_BYTES = 8192
 
 class Name(NamedTuple):
     """An occurrence of a name of the scene. ``role`` is definition, write (a Calculation assigns it, or it is a
-    Selection's parameter), target (left of an arrow) or read. ``start`` and ``end`` are bytes in the block."""
+    Selection's parameter), target (left of an arrow) or read. ``start`` and ``end`` are bytes in the block; ``node`` is
+    its syntax."""
 
     name: str
     role: str
     start: int
     end: int
+    node: syntax.Name
 
 
 class Definition(NamedTuple):
@@ -53,15 +55,27 @@ class Definition(NamedTuple):
 
 @dataclass
 class Facts:
-    """See the module. ``text`` is what was parsed; ``definitions`` are those that name something; ``blocks`` are scene blocks;
-    ``assigned`` are the names that get values, in text order; ``ghosts`` are definitions of an earlier text that
-    this one has lost to a syntax error."""
+    """See the module. ``text`` is what was parsed; ``definitions`` are those that
+    name something; ``blocks`` are scene blocks; ``assigned`` are the names that get values, in text order; ``ghosts`` are
+    definitions of an earlier text that this one has lost to a syntax error; ``spans`` are all places in ``file``, if
+    there are no messages in ``syntax``."""
 
     text: bytes
-    tree: Tree
+    _tree: Tree | None
     file: syntax.File
+    spans: list[Span] = field(repr=False)
     syntax: list[Diagnostic]
     ghosts: dict[str, Definition] = field(default_factory=dict)
+
+    @property
+    def tree(self) -> Tree:
+        if self._tree is None:
+            self._tree = syntax_tree(self.text)
+        return self._tree
+
+    def retouched(self) -> None:
+        """The text has changed, and with it all else but the tree."""
+        self.text, self._tree = self.file.span.source.data, None
 
     @cached_property
     def definitions(self) -> list[Definition]:
@@ -137,8 +151,9 @@ def _read(block: Block) -> Facts:
     diagnostics = Diagnostics()
     text = mistakes.clean(block, diagnostics)
     tree = syntax_tree(text, _old_tree(block))
-    file = convert(block, text, tree, diagnostics)
-    return Facts(text, tree, file, diagnostics.items)
+    spans: list[Span] = []
+    file = convert(block, text, tree, diagnostics, spans)
+    return Facts(text, tree, file, spans, diagnostics.items)
 
 
 def _old_tree(block: Block) -> Tree | None:
@@ -165,7 +180,7 @@ def _point(block: Block, offset: int) -> tuple[int, int]:
 
 
 def _occurrence(name: syntax.Name, role: str = "read") -> Name:
-    return Name(name.name, role, name.span.start, name.span.end)
+    return Name(name.name, role, name.span.start, name.span.end, name)
 
 
 def _names_of(node: syntax.Definition) -> Iterator[Name]:

@@ -42,6 +42,7 @@ class Namespace:
         self.writers: dict[str, dict[Block, list[syntax.Name]]] = {}
         self.users: dict[str, dict[Block, None]] = {}
         self.entries: dict[str, Entry] = {}
+        self._unfinished: dict[str, dict[Block, None]] = {}
         self._position = position
         self._signatures: dict[str, object] = {}
         self._touched: dict[str, None] = {}  # names that may mean something else since the last refresh
@@ -53,6 +54,7 @@ class Namespace:
         facts = facts_of(block)
         for definition in (*facts.definitions, *facts.ghosts.values()):
             self._drop(self.definers, definition.name, block)
+            self._drop(self._unfinished, definition.name, block)
             self._touched[definition.name] = None
         for name in facts.assigned:
             self._drop(self.writers, name.name, block)
@@ -72,6 +74,8 @@ class Namespace:
         facts = facts_of(block)
         for definition in (*facts.definitions, *facts.ghosts.values()):
             self.definers.setdefault(definition.name, {}).setdefault(block, []).append(definition)
+            if definition.kind == "calculation" and facts.is_broken:
+                self._unfinished.setdefault(definition.name, {})[block] = None
             self._touched[definition.name] = None
         for name in facts.assigned:
             self.writers.setdefault(name.name, {}).setdefault(block, []).append(name)
@@ -120,6 +124,8 @@ class Namespace:
                 if entry is not None:
                     self._names[entry.kind].remove(name)
                 self._names.setdefault(kind, NameIndex()).add(name)
+        else:
+            entry.value, entry.failed = None, False  # the same syntax may say something else: see retouch.py
         if node is None:
             return self._signatures.pop(name, None) is not None
         several = sum(map(len, self.definers.get(name, {}).values())) > 1
@@ -141,10 +147,13 @@ class Namespace:
         writers = self.writers.get(name)
         return (next(iter(writers.values()))[0], "parameter") if writers else (None, "")
 
+    @property
+    def has_unfinished(self) -> bool:
+        return bool(self._unfinished)
+
     def is_unfinished(self, name: str) -> bool:
         """Whether ``name`` is a Calculation that is being typed: what it assigns isn't known yet."""
-        found = self.definers.get(name, {}).items()
-        return any(facts_of(block).is_broken and any(each.kind == "calculation" for each in several) for block, several in found)
+        return name in self._unfinished
 
     def renew(self, definition: Definition) -> Entry | None:
         """Forget the value of the entry that ``definition`` makes; the entry, if it makes one."""

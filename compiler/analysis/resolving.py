@@ -13,6 +13,7 @@ from typing import Callable, Iterable
 
 from ..reading import syntax
 from ..reading.diagnostics import Diagnostic, Diagnostics, Note
+from ..reading.model import Empty
 from ..reading.resolve import Resolver
 from ..reading.resolve_names import Entry
 from ..reading.source import Source, Span
@@ -46,15 +47,23 @@ class Router(Diagnostics):
 class BlockResolver(Resolver):
     """Resolves in the namespace ``entries``. It is made anew for each block, so that what it remembers of one doesn't
     outlive it; values of constants stay in the entries. ``nearest`` finds names that are like a wrong one faster than
-    by comparing all of them."""
+    by comparing all of them. Terms of rules that don't touch ``only`` are known to be right and left out."""
 
     def __init__(
-        self, block: Source, diagnostics: Diagnostics, entries: dict[str, Entry], nearest: Nearest | None = None
-    ) -> None:
+        self, block: Source, diagnostics: Diagnostics, entries: dict[str, Entry], nearest: Nearest | None = None,
+        only: Span | None = None,
+    ) -> None:  # fmt: skip
         super().__init__(syntax.File(Span(block, 0, 0), ()), diagnostics, {}, 0.0, Source.read)
         self.names.entries = entries
         # Which entry actions run where decides no message, and the closure of all references costs too much per key.
         self.terms.reached = lambda name: frozenset()  # type: ignore[method-assign]
+        if only is not None:
+            term = self.terms.term
+            self.terms.term = (  # type: ignore[method-assign]
+                lambda node, owner: term(node, owner)
+                if node.span.start <= only.start and only.end <= node.span.end
+                else Empty(node.span)
+            )
         if nearest is not None:
             self._nearest, self._hints = nearest, {}
             self.names.nearest = self._hint  # type: ignore[method-assign]

@@ -32,6 +32,7 @@ from .namespace import Namespace
 from .parts import role_of
 from .pending import Pending
 from .resolving import BlockResolver, Router
+from .retouch import retouch, touch_of
 from .text import Block, Change
 
 # A change that adds so many blocks is a file that is opened: reading it takes longer than a request may wait.
@@ -62,7 +63,8 @@ class Scene:
         self._messages: dict[Block, list[Diagnostic]] = {}  # of resolving
         self._syntax: dict[Block, list[Diagnostic]] = {}
         self._ignoring: dict[Block, None] = {}  # blocks with `plsys-ignore` comments
-        self._edited: dict[Block, None] = {}  # blocks to be resolved: the last one first
+        # Blocks to be resolved: the last one first. A place is all that has changed in a block that was right.
+        self._edited: dict[Block, Span | None] = {}
         self._dirty: dict[Block, None] = {}  # then those that use what was edited
         self._opened: dict[Block, None] = {}  # and then those of a file that was opened, from its start
         self._router = Router(self._messages)
@@ -88,8 +90,9 @@ class Scene:
         if not self.read(deadline):
             return False
         while self._edited or self._dirty or self._opened:
+            only = None
             if self._edited:
-                block = self._edited.popitem()[0]
+                block, only = self._edited.popitem()
             elif self._dirty:
                 block = next(iter(self._dirty))
             elif had_edits and deadline is not None:
@@ -98,7 +101,7 @@ class Scene:
                 block = next(iter(self._opened))
             self._dirty.pop(block, None)
             self._opened.pop(block, None)
-            self._resolve(block)
+            self._resolve(block, only)
             if deadline is not None and deadline.has_passed():
                 return self.is_current
         return True
@@ -124,6 +127,9 @@ class Scene:
         """Reads what is pending, with a pause after each block."""
         while self._pending:
             change, removed_includes = self._pending.take(), False
+            if self._retouch(change):
+                yield
+                continue
             if change.removed:
                 for block in change.added:
                     facts_of(block)
@@ -142,9 +148,26 @@ class Scene:
             if removed_includes or any(facts_of(block).includes for block in change.added if b"include" in block.data):
                 self._find_files()
         for block in self._names.refresh():
-            if block is not None and block not in self._edited and block not in self._opened:
+            if block in self._edited:
+                self._edited[block] = None
+            elif block is not None and block not in self._opened:
                 self._dirty[block] = None
             yield
+
+    def _retouch(self, change: Change) -> bool:
+        """Whether all that was typed is letters of a name, which has been read then."""
+        if len(change.removed) != 1 or len(change.added) != 1 or any(len(each.scenes) > 1 for each in self.documents):
+            return False
+        (old,), (new,) = change
+        touch = touch_of(old, new)
+        if touch is None:
+            return False
+        was_right = not any(old in table for table in (self._messages, self._edited, self._dirty, self._opened))
+        self._forget(old)
+        place = retouch(old, new, touch)
+        self._learn(new)
+        self._edited[new] = place if was_right else None
+        return True
 
     def _forget(self, block: Block) -> None:
         waiting = self._edited, self._dirty, self._opened
@@ -172,7 +195,7 @@ class Scene:
                 return i, document.text.order[block], definition.node.span.start
         return len(self.documents), 0, 0
 
-    def _resolve(self, block: Block) -> None:
+    def _resolve(self, block: Block, only: Span | None = None) -> None:
         self._messages.pop(block, None)
         facts = facts_of(block)
         if facts.is_broken:
@@ -180,18 +203,13 @@ class Scene:
         for definition in facts.definitions:
             # Another block that uses it may have been first, and its messages went with the old ones.
             self._names.renew(definition)
-        resolver = BlockResolver(block, self._router, self.entries, self._names.nearest)
+        resolver = BlockResolver(block, self._router, self.entries, self._names.nearest, only)
         try:
             resolver.run_on(facts)
         except RecursionError:
             pass  # the whole-file checks, which have more room, report it
         finally:
             resolver.close()
-        found = self._messages.get(block)
-        if found and any(self._names.is_unfinished(each.name) for each in facts.names):
-            found[:] = [each for each in found if each.code != "unknown-name"]
-        if found is not None and not found:
-            del self._messages[block]
 
     # --- included files
 
@@ -264,13 +282,20 @@ class Scene:
         for index, block in sorted((order[block], block) for block in noisy if block in order):
             base = document.text.start_at(index)
             for table in tables:
-                found += [Message(d, base + d.span.start, base + d.span.end) for d in table.get(block, ())]
+                said = table.get(block, ())
+                if table is self._messages and self._is_unfinished(block):
+                    said = [each for each in said if each.code != "unknown-name"]
+                found += [Message(d, base + d.span.start, base + d.span.end) for d in said]
         # Resolving by block and the whole-file checks both look for missing files.
         found = list({(m.start, m.diagnostic.code, m.diagnostic.message): m for m in found}.values())
         found += self._second_ones(document)
         ignored = self._ignores(document)
         kept = [m for m in found if not is_ignored(m.diagnostic.code, m.diagnostic.severity, m.start, ignored)]
         return sorted(kept, key=lambda message: (message.start, message.end))
+
+    def _is_unfinished(self, block: Block) -> bool:
+        """Whether names that ``block`` uses may be about to be assigned."""
+        return self._names.has_unfinished and any(self._names.is_unfinished(each.name) for each in facts_of(block).names)
 
     def _ignores(self, document: Document) -> list[Ignore]:
         """What `plsys-ignore` comments of ``document`` say. One at the end of a block may speak of the next one."""

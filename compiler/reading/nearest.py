@@ -49,7 +49,28 @@ def nearest_of(name: str, indexes: Sequence[NameIndex]) -> str:
         return _hint(name, [other for index in indexes for other in index.heads])
     found = set(_neighbours(name, [index.heads for index in indexes]))
     found.update(other[::-1] for other in _neighbours(name[::-1], [index.tails for index in indexes]))
+    if (slip := _a_letter_off(name, found)) is not None:
+        return f"did you mean '{slip}'?"
     return _hint(name, sorted(found, key=lambda other: (-_alike(name, other), other))[:LIKELIEST])
+
+
+def _a_letter_off(name: str, names: Iterable[str]) -> str | None:
+    """The one of ``names`` that has a letter more than ``name``, or else one that lacks a letter: by difflib's ratio no
+    other is more like a ``name`` of three letters or more, so that the others needn't be compared."""
+    size, slips = len(name), []
+    for other in names:
+        more = len(other) - size
+        if (more == 1 and _has_one_more(name, other)) or (more == -1 and _has_one_more(other, name)):
+            slips.append(other)
+        elif not more and other.casefold() == name.casefold():
+            return None
+    return max(slips, key=lambda other: (len(other), other), default=None) if size > 2 else None
+
+
+def _has_one_more(one: str, other: str) -> bool:
+    """Whether ``other`` is ``one`` with a letter more."""
+    head = _same(one, other)
+    return one[head:] == other[head + 1 :]
 
 
 def _hint(name: str, names: list[str]) -> str:

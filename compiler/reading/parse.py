@@ -36,11 +36,14 @@ def parse(source: Source) -> tuple[syntax.File, Diagnostics]:
     return convert(source, text, syntax_tree(text), diagnostics), diagnostics
 
 
-def convert(source: Source, text: bytes, tree: Tree, diagnostics: Diagnostics) -> syntax.File:
+def convert(
+    source: Source, text: bytes, tree: Tree, diagnostics: Diagnostics, spans: list[Span] | None = None
+) -> syntax.File:
     """The syntax tree from tree-sitter's tree of ``text``, which is ``mistakes.clean(source, …)``; syntax
     errors go to ``diagnostics``. For callers that keep the tree up to date, by
-    ``grammar.syntax_tree(text, old_tree)``."""
-    reader = _FileReader(source, text, diagnostics)
+    ``grammar.syntax_tree(text, old_tree)``. Where there are no errors, ``spans`` gets every span of
+    the syntax tree."""
+    reader = _FileReader(Reading(source, text, diagnostics, spans))
     reader.file(tree)
     mistakes.extras(reader.reading, tree)
     if diagnostics.items:
@@ -49,14 +52,14 @@ def convert(source: Source, text: bytes, tree: Tree, diagnostics: Diagnostics) -
         habits.sharpen(source, text, diagnostics)
     check_ignores(source, text, diagnostics)
     diagnostics.items[:] = diagnostics.sorted()
-    return syntax.File(Span(source, 0, len(source.data)), tuple(reader.definitions))
+    return syntax.File(reader.reading.between(0, len(source.data)), tuple(reader.definitions))
 
 
 class _FileReader:
     """Collects the definitions of one file, and decides how much is said about a broken one."""
 
-    def __init__(self, source: Source, text: bytes, diagnostics: Diagnostics) -> None:
-        self.reading = Reading(source, text, diagnostics)
+    def __init__(self, reading: Reading) -> None:
+        self.reading = reading
         self.reader = DefinitionReader(self.reading)
         self.definitions: list[syntax.Definition] = []
         # The last definition that broke: what follows it, up to the next one that starts a line no deeper,

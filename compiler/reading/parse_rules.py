@@ -135,7 +135,7 @@ class _Body(RightSides):
             piece = pieces[i]
         for piece, then in reversed(links):
             if then is not None:
-                span = piece.span.to((otherwise or then).span)
+                span = self.reading.between(piece.span.start, (otherwise or then).span.end)
                 otherwise = syntax.If(span, piece.value, then, otherwise)
         return otherwise, i
 

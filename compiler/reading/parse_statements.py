@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 from . import syntax
 from .parse_values import Abandon, Reading, call, expression, expressions, name
-from .source import Span
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
 _REPEAT = "a Selection repeats: Selection Row { if (n > 0) Row -> C_count Row; }"
-_FOREIGN = {
+# Words that begin statements elsewhere.
+FOREIGN = {
     "for": _REPEAT,
     "while": _REPEAT,
     "do": _REPEAT,
@@ -83,7 +83,7 @@ def _split_lines(reading: Reading, parts: list[Node]) -> list[tuple[int, int]]:
 
 
 def _one_operation(reading: Reading, parts: list[Node]) -> syntax.Operation:
-    if (hint := _FOREIGN.get(reading.text(parts[0]))) is not None:
+    if (hint := FOREIGN.get(reading.text(parts[0]))) is not None:
         raise Abandon(reading.span(parts[0]), f"'{reading.text(parts[0])}' is no statement", hint)
     commas = [part for part in parts if part.type == ","]
     arguments = expressions(reading, [part for part in parts[1:] if part.type != ","], 0)
@@ -100,7 +100,7 @@ def _one_operation(reading: Reading, parts: list[Node]) -> syntax.Operation:
             )
         else:
             reading.complain(commas[-1], "this ',' separates nothing", "remove it")
-    span = Span(reading.source, parts[0].start_byte, parts[-1].end_byte)
+    span = reading.between(parts[0].start_byte, parts[-1].end_byte)
     return syntax.Operation(span, name(reading, parts[0]), arguments)
 
 

@@ -93,14 +93,22 @@ class TooDeep(Abandon):
 
 class Reading:
     """One file being read: its text (the bytes that were parsed), what is said about it, and the shorthands
-    that all readers use."""
+    that all readers use. ``spans`` get those of all nodes of a syntax tree without mistakes."""
 
-    def __init__(self, source: Source, text: bytes, diagnostics: Diagnostics) -> None:
+    def __init__(
+        self, source: Source, text: bytes, diagnostics: Diagnostics, spans: list[Span] | None = None
+    ) -> None:
         self.source, self.data, self.diagnostics = source, text, diagnostics
         self.foreign_names: set[str] = set()
+        self.spans: list[Span] = [] if spans is None else spans
 
     def span(self, node: Node) -> Span:
-        return Span(self.source, node.start_byte, node.end_byte)
+        return self.between(node.start_byte, node.end_byte)
+
+    def between(self, start: int, end: int) -> Span:
+        span = Span(self.source, start, end)
+        self.spans.append(span)
+        return span
 
     def text(self, node: Node) -> str:
         return self.data[node.start_byte : node.end_byte].decode(errors="replace")

@@ -54,11 +54,11 @@ class Terms:
 
     def union(self, node: syntax.Union, owner: str) -> Operand:
         terms = tuple(
-            self.names.reporting(lambda: self._term(term, owner), Empty(term.span)) for term in node.terms
+            self.names.reporting(lambda: self.term(term, owner), Empty(term.span)) for term in node.terms
         )
         return terms[0] if len(terms) == 1 else Sum(terms, node.span)
 
-    def _term(self, node: syntax.Term, owner: str) -> Operand:
+    def term(self, node: syntax.Term, owner: str) -> Operand:
         if not node.items:
             return Empty(node.span)
         *prefixes, last = node.items

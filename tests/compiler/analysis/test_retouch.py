@@ -1,0 +1,173 @@
+"""What is kept of a block when letters are typed into its names is what a reading of the new text gives."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+from plsys.compiler.analysis import Document, Project, facts_of
+from plsys.compiler.analysis.text import Block
+from plsys.compiler.reading.source import Span
+from stress import rounds
+
+ROOT = Path(__file__).resolve().parents[3]
+SCENES = sorted((ROOT / "scenes").glob("*.plsys"))
+
+SCENE = """\
+#declare Height = 2;
+#declare Bark = texture { pigment { color rgb <Height/4, 0.3, 0.1> } }
+Selection Tree(n)
+{
+    C_init Tree;
+    if (n > Height) Tree -> [ scale 1 1
+                                        Height; --n ] cylinder + C_less (T_up Tree(n - 1) + T_down Tree(n));
+    else Tree -> 2: sphere | n: cone;
+}
+Selection Bush { Bush -> T_up sphere + Tree(2); }
+Calculation C_init { angle = 60; tilt = angle ? 2 : -angle; }
+Calculation C_less { angle -= max(4, tilt); }
+Transformation T_up { trans 0 0 Height;   roty angle
+    ; rotx tilt;  /* a comment */ scale
+                                  tilt; }
+Transformation T_down { roty angle  // ;
+                                   tilt ;
+}
+object { Tree(3) texture { Bark } translate <Height, 0, 0> }
+object { Bush }
+"""
+LETTERS = ["x", "for", "i", "f", "1", "_", "rgb", " ", "-", "", "", "", "cone", "Bark", "é"]
+
+
+def shown(value: object, block: Block) -> object:
+    """Syntax as plain values, with places that must be of ``block``."""
+    if isinstance(value, Span):
+        assert value.source is block
+        return value.start, value.end
+    if isinstance(value, tuple | list):
+        return [shown(each, block) for each in value]
+    if hasattr(value, "__slots__"):
+        fields = [name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())]
+        return type(value).__name__, [(name, shown(getattr(value, name), block)) for name in fields]
+    return value
+
+
+def known(block: Block) -> list[object]:
+    facts = facts_of(block)
+    return [
+        shown(facts.file, block),
+        [each[:4] for each in facts.names],
+        [(each.name, each.kind, shown(each.node, block)) for each in facts.definitions],
+        shown(facts.assigned, block),
+        [(each.code, each.message, shown(each.span, block)) for each in facts.syntax],
+        facts.text,
+        str(facts.tree.root_node),
+    ]
+
+
+def told(project: Project, document: Document) -> list[tuple]:
+    project.work()
+    return sorted((m.start, m.end, m.diagnostic.code, m.diagnostic.message) for m in project.messages(document))
+
+
+def check(project: Project, document: Document) -> None:
+    """All that is known equals what a fresh start finds out."""
+    for block in document.text.blocks:
+        assert known(block) == known(Block(block.name, block.data, block.path, block.shape))
+    if not any(facts_of(block).ghosts for block in document.text.blocks):
+        fresh = Project()
+        other = fresh.open(document.path, document.text.data, name="y")
+        assert told(project, document) == told(fresh, other), document.text.data.decode()
+
+
+def places(rng: random.Random, document: Document, count: int) -> list[int]:
+    """Places at and in names mostly, the last one first."""
+    names = [base + rng.randint(each.start, each.end)
+             for block, base in zip(document.text.blocks, document.text.starts) for each in facts_of(block).names]  # fmt: skip
+    return sorted({rng.choice(names) if rng.random() < 0.8 else rng.randrange(len(document.text)) for _ in range(count)}, reverse=True)
+
+
+def type_at_many_places(rng: random.Random, document: Document, project: Project) -> int:
+    """A change at several places, and the change back of some; how often facts were kept."""
+    before = {block: facts_of(block) for block in document.text.blocks}
+    read = {id(facts) for facts in before.values()}
+    letters = rng.choice(LETTERS)
+    cut = 0 if letters and rng.random() < 0.7 else 1
+    project.edits(document, [(at, at + cut, letters.encode()) for at in places(rng, document, rng.choice((1, 3, 6)))])
+    project.work()
+    return sum(block not in before and id(facts_of(block)) in read for block in document.text.blocks)
+
+
+@pytest.mark.parametrize("seed", range(rounds(25, 2_000)))
+def test_letters_at_many_places(seed):
+    rng = random.Random(seed)
+    text = SCENE if seed % 3 else SCENES[seed % len(SCENES)].read_text()
+    project = Project()
+    document = project.open(None, text.encode(), name="x")
+    project.work()
+    kept = 0
+    for _ in range(10):
+        kept += type_at_many_places(rng, document, project)
+        check(project, document)
+    if seed == 1:
+        assert kept > 0
+
+
+@pytest.mark.parametrize(
+    "text, typed",
+    [
+        ("Transformation Tree| { roty\n                       angle; }\n", "s"),  # `angle` stands no deeper now
+        ("Transformation T { roty i|; }\n", "f"),
+        ("Transformation T { fo| 1; }\n", "r"),
+        ("#declare B = texture { pigment { color rg| 1 } }\n", "b"),
+        ("Selection A { A -> texture { pigment { color rg| 1 } } box; }\n", "b"),
+        ("Selection A { C_a A|; A -> box; }\n", "b"),
+        ("Selection A| { C_a A; A -> box; }\n", "b"),
+        ("Calculation C { |n = 1; }\n", "é"),
+        ("Calculation C { |n = 1; }\n", "2"),
+        ("Calculation C { n| = 1; }\n", " 2"),
+        ('#include "|a.plsys"\n#declare B = c;\n', "b"),
+    ],
+)
+def test_letters_with_a_meaning(text, typed):
+    project = Project()
+    document = project.open(None, text.replace("|", "").encode(), name="x")
+    project.work()
+    project.edit(document, text.index("|"), text.index("|"), typed.encode())
+    project.work()
+    check(project, document)
+
+
+def test_a_letter_in_a_name_keeps_the_rest():
+    project = Project()
+    document = project.open(None, SCENE.encode(), name="x")
+    project.work()
+    at = SCENE.index("cylinder + C_less")
+    block = document.text.block_at(at)[0]
+    facts = facts_of(block)
+    project.edit(document, at, at, b"T_up x")
+    project.work()
+    assert facts_of(document.text.block_at(at)[0]) is not facts  # a name more
+    at = document.text.data.index(b"T_up xcylinder")
+    facts = facts_of(document.text.block_at(at)[0])
+    project.edit(document, at + 5, at + 6, b"")
+    project.work()
+    assert facts_of(document.text.block_at(at)[0]) is facts
+    check(project, document)
+
+
+def test_a_name_in_a_file_of_two_scenes_is_read_anew(tmp_path):
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.plsys").write_text('#include "library.plsys"\nobject { Tree }\n')
+    (tmp_path / "library.plsys").write_text("Selection Tree { Tree -> T_up sphere; }\nTransformation T_up { trans 0 0 1; }\n")
+    project = Project()
+    documents = [project.open(path, path.read_bytes()) for path in sorted(tmp_path.glob("*.plsys"))]
+    library = next(each for each in documents if each.path.stem == "library")
+    project.work()
+    assert len(library.scenes) == 2
+    at = library.text.data.index(b"T_up sphere")
+    project.edit(library, at, at, b"x")
+    project.work()
+    for scene in library.scenes:
+        assert [each.diagnostic.message[:20] for each in scene.messages(library)] == ["unknown name 'xT_up'"]
+        assert scene.uses("T_up") and len(scene.uses("xT_up")) == 1
