@@ -1,6 +1,8 @@
 /* class_box.c - bounds of leaves, of unions and below transformations (class.h). */
 #include "class.h"
 
+#include <string.h>
+
 pl_bounds pl_bounds_nothing(void)
 {
     return (pl_bounds){.box = pl_box_empty(), .hull = pl_hull_empty(), .hollow = false};
@@ -145,10 +147,46 @@ void pl_bounds_through_range(const pl_range_map *map, pl_bounds *bounds)
     else tighten(bounds);
 }
 
+/* Its diameter is the width along some v with components of falling size a, b, c: no more than (a-b) times the width to a face, (b-c)
+ * to an edge and c to a corner. With widths F, E and C that is the product of v with (F, E-F, C-E), so no more than the length of that
+ * for the worst face, edge and corner that meet. */
+static double diameter_of(const pl_hull *hull)
+{
+    double square = 0.0;
+    for (int i = 0; i < 24; i++) {
+        const int first = i % 3, second = (first + 1 + i / 3 % 2) % 3, third = 3 - first - second;
+        int v[3] = {0};
+        double widths[3];
+        for (int part = 0; part < 3; part++) {
+            v[part == 0 ? first : part == 1 ? second : third] = part == 1 && i / 6 % 2 ? -1 : part == 2 && i / 12 ? -1 : 1;
+            widths[part] = pl_hull_support(hull, v[0], v[1], v[2]) + pl_hull_support(hull, -v[0], -v[1], -v[2]);
+        }
+        const double e = widths[1] - widths[0], c = widths[2] - widths[1];
+        const double length = widths[0] * widths[0] + e * e + c * c;
+        if (!(length <= square)) square = length;
+    }
+    return sqrt(square) * (1.0 + 1e-12);
+}
+
 pl_gate_box pl_bounds_gate(const pl_bounds *bounds)
 {
-    pl_gate_box gate = {bounds->box, bounds->reach, pl_box_diameter(&bounds->box), bounds->unbounded, false};
+    static const int bevels[PL_GATE_BEVELS][3] = {{1, 1, 0}, {1, -1, 0}, {1, 0, 1}, {1, 0, -1}, {0, 1, 1},
+                                                  {0, 1, -1}, {1, 1, 1}, {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
+    pl_gate_box gate;
+    memset(&gate, 0, sizeof gate); /* gates are compared byte by byte */
+    gate.box = bounds->box;
+    gate.reach = bounds->reach;
+    gate.diameter = pl_box_diameter(&bounds->box);
+    gate.unbounded = bounds->unbounded;
+    gate.bevelled = !bounds->unbounded && !pl_box_is_empty(&bounds->box);
+    if (!gate.bevelled) return gate;
+    for (int i = 0; i < PL_GATE_BEVELS; i++) {
+        const int *v = bevels[i];
+        gate.low[i] = pl_round_down(-pl_hull_support(&bounds->hull, -v[0], -v[1], -v[2]));
+        gate.high[i] = pl_round_up(pl_hull_support(&bounds->hull, v[0], v[1], v[2]));
+    }
+    gate.diameter = fmin(gate.diameter, diameter_of(&bounds->hull));
     /* Points of the box are meant, which may be farther out than what stands in it. */
-    if (!gate.unbounded) gate.reach.size = 1.7320508075688774 * pl_box_reach(&gate.box);
+    gate.reach.size = 1.7320508075688774 * pl_box_reach(&gate.box);
     return gate;
 }

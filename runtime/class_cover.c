@@ -68,6 +68,12 @@ void pl_covers_free(pl_covers *c)
 
 /* --- a ray --- */
 
+static bool is_met(const pl_gate_box *gate, const double o[3], const double d[3])
+{
+    const pl_span all = {-INFINITY, INFINITY}, span = pl_gate_span(gate, o, d, all);
+    return span.enter <= span.leave;
+}
+
 /* At an instance: whether the ray goes on into it; small ones are counted in *met. */
 static bool opens(pl_covers *c, double smallest, bool may_open, int *met)
 {
@@ -75,12 +81,11 @@ static bool opens(pl_covers *c, double smallest, bool may_open, int *met)
     const double *o = walk->at.payload;
     pl_bounds bounds;
     uint64_t work = 0;
-    double entry;
     pl_classes_bound(c->classes, c->program->nodes[walk->node].as.enter.symbol, &walk->scope, &bounds, &work);
     if (bounds.unbounded) return may_open;
-    pl_slab slab = pl_slab_of(o, o + 3, pl_reach_slack(&bounds.reach, o));
-    if (pl_box_is_empty(&bounds.box) || !pl_slab_hits(&slab, &bounds.box, -INFINITY, INFINITY, &entry)) return false;
-    if (may_open && pl_box_diameter(&bounds.box) * walk->at.payload[6] > smallest) return true;
+    const pl_gate_box gate = pl_bounds_gate(&bounds);
+    if (pl_box_is_empty(&bounds.box) || !is_met(&gate, o, o + 3)) return false;
+    if (may_open && gate.diameter * walk->at.payload[6] > smallest) return true;
     ++*met;
     return false;
 }
@@ -149,7 +154,7 @@ static double fixpoint(const int *met, int count)
 
 static double measure(pl_covers *c, uint32_t symbol, int direction)
 {
-    double s[3], a[3], b[3], entry;
+    double s[3], a[3], b[3];
     int met[RAYS], count = 0;
     pl_bounds bounds;
     uint64_t work = 0;
@@ -158,8 +163,8 @@ static double measure(pl_covers *c, uint32_t symbol, int direction)
         c->scope.key = pl_mix(symbol, (uint64_t)k);
         pl_classes_bound(c->classes, symbol, &c->scope, &bounds, &work);
         if (bounds.unbounded || pl_box_is_empty(&bounds.box)) return 1.0;
+        const pl_gate_box gate = pl_bounds_gate(&bounds);
         const double wide = half_width(&bounds.box, a), high = half_width(&bounds.box, b);
-        pl_slab slab;
         for (int i = 0; i < SIDE * SIDE; i++) {
             double u[4], o[3], d[3];
             for (int n = 0; n < 4; n++) u[n] = pl_unit(pl_mix(pl_mix(c->scope.key, (uint64_t)(16 * direction + n)), (uint64_t)i));
@@ -168,9 +173,8 @@ static double measure(pl_covers *c, uint32_t symbol, int direction)
                 o[axis] = 0.5 * (bounds.box.lo[axis] + bounds.box.hi[axis]) + x * a[axis] + y * b[axis];
                 d[axis] = s[axis] + TURN * ((u[2] - 0.5) * a[axis] + (u[3] - 0.5) * b[axis]);
             }
-            slab = pl_slab_of(o, d, 0.0);
-            if (!pl_slab_hits(&slab, &bounds.box, -INFINITY, INFINITY, &entry)) continue;
-            met[count++] = cast(c, symbol, o, d, PARTS * pl_box_diameter(&bounds.box));
+            if (!is_met(&gate, o, d)) continue;
+            met[count++] = cast(c, symbol, o, d, PARTS * gate.diameter);
         }
     }
     return fixpoint(met, count);

@@ -21,6 +21,35 @@ static pl_span clip(const pl_box *box, const double o[3], const double d[3], dou
     return within;
 }
 
+/* Sums of coordinates are as far off as these together, and round. */
+#define BEVEL_SLACK 4.0
+
+static pl_span clip_bevels(const pl_gate_box *gate, const double o[3], const double d[3], double slack, pl_span within)
+{
+    double at[PL_GATE_BEVELS], along[PL_GATE_BEVELS], enter[PL_GATE_BEVELS], leave[PL_GATE_BEVELS];
+    pl_gate_bevels(o, at);
+    pl_gate_bevels(d, along);
+    for (int i = 0; i < PL_GATE_BEVELS; i++) {
+        const double inverse = 1.0 / along[i];
+        const double low = ((double)gate->low[i] - BEVEL_SLACK * slack - at[i]) * inverse;
+        const double high = ((double)gate->high[i] + BEVEL_SLACK * slack - at[i]) * inverse;
+        enter[i] = along[i] < 0.0 ? high : low;
+        leave[i] = along[i] < 0.0 ? low : high;
+    }
+    /* A ray in a plane gives NaN, which is left aside. */
+    for (int i = 0; i < PL_GATE_BEVELS; i++) {
+        within.enter = enter[i] > within.enter ? enter[i] : within.enter;
+        within.leave = leave[i] < within.leave ? leave[i] : within.leave;
+    }
+    return within;
+}
+
+static pl_span clip_gate(const pl_gate_box *gate, const double o[3], const double d[3], double slack, pl_span within)
+{
+    within = clip(&gate->box, o, d, slack, within);
+    return gate->bevelled && within.enter <= within.leave ? clip_bevels(gate, o, d, slack, within) : within;
+}
+
 static pl_span span_with_room(const pl_box *box, double diameter, const double o[3], const double d[3], double slack,
                               pl_span within)
 {
@@ -35,7 +64,12 @@ pl_span pl_span_in(const pl_states *states, uint32_t state, const double o[3], c
 
 pl_span pl_span_below(const pl_gate_box *gate, const double o[3], const double d[3], pl_span within)
 {
-    return span_with_room(&gate->box, gate->diameter, o, d, pl_reach_slack(&gate->reach, o), within);
+    return clip_gate(gate, o, d, ROOM_SLACK * pl_reach_slack(&gate->reach, o) + ROOM_SIZE * gate->diameter, within);
+}
+
+pl_span pl_gate_span(const pl_gate_box *gate, const double o[3], const double d[3], pl_span within)
+{
+    return clip_gate(gate, o, d, pl_reach_slack(&gate->reach, o), within);
 }
 
 pl_gate pl_gate_at(const pl_gate_box *s, const double o[3], const double d[3], double stretch,
@@ -44,16 +78,16 @@ pl_gate pl_gate_at(const pl_gate_box *s, const double o[3], const double d[3], d
 {
     double slack = pl_reach_slack(&s->reach, o);
     if (s->unbounded) {
-        *inside = span_with_room(&s->box, s->diameter, o, d, slack, within);
+        *inside = pl_span_below(s, o, d, within);
         return PL_GATE_OPEN;
     }
     if (pl_box_is_empty(&s->box)) return PL_GATE_MISSED;
-    pl_span own = clip(&s->box, o, d, slack, within);
+    pl_span own = clip_gate(s, o, d, slack, within);
     *t_entry = own.enter;
     if (!(own.enter <= own.leave && own.enter <= t_max)) return PL_GATE_MISSED;
     bool small = s->diameter * stretch <= footprint->width + footprint->spread * own.enter;
     if (!small && !(s->endless && s->diameter <= PL_CUT_BLUR * slack)) {
-        *inside = span_with_room(&s->box, s->diameter, o, d, slack, within);
+        *inside = pl_span_below(s, o, d, within);
         return PL_GATE_OPEN;
     }
     /* From within, and within the footprint that a ray starts from, nothing is told of the box's sides. */
@@ -65,7 +99,13 @@ pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], c
                    pl_span *inside)
 {
     const pl_state *s = &states->list[state];
-    const pl_gate_box box = {s->box, s->gate, s->diameter, s->unbounded, s->endless};
+    pl_gate_box box;
+    box.box = s->box;
+    box.reach = s->gate;
+    box.diameter = s->diameter;
+    box.unbounded = s->unbounded;
+    box.endless = s->endless;
+    box.bevelled = false;
     return pl_gate_at(&box, o, d, stretch, footprint, within, t_min, t_max, t_entry, inside);
 }
 

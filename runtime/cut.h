@@ -46,17 +46,38 @@ typedef struct pl_span {
 
 typedef enum pl_gate { PL_GATE_MISSED, PL_GATE_OPEN, PL_GATE_CUT } pl_gate;
 
-/* What a gate knows of an instance. */
+/* What a gate knows of an instance. Where it is known of a class, the box lacks edges and corners: what stands beyond planes
+ * across them, in the directions to a cube's edges and corners, doesn't belong to it. */
+enum { PL_GATE_BEVELS = 10 };
 typedef struct pl_gate_box {
     pl_box box;
     pl_reach reach;
     double diameter;
-    bool unbounded, endless;
+    bool unbounded, endless, bevelled;
+    float low[PL_GATE_BEVELS], high[PL_GATE_BEVELS]; /* along pl_gate_bevels of points */
 } pl_gate_box;
+
+/* A vector along the directions of bevels: x+y, x-y, x+z, x-z, y+z, y-z, x+y+z, x+y-z, x-y+z, x-y-z. */
+static inline void pl_gate_bevels(const double v[3], double along[PL_GATE_BEVELS])
+{
+    along[0] = v[0] + v[1];
+    along[1] = v[0] - v[1];
+    along[2] = v[0] + v[2];
+    along[3] = v[0] - v[2];
+    along[4] = v[1] + v[2];
+    along[5] = v[1] - v[2];
+    along[6] = along[0] + v[2];
+    along[7] = along[0] - v[2];
+    along[8] = along[1] + v[2];
+    along[9] = along[1] - v[2];
+}
 
 pl_gate pl_gate_at(const pl_gate_box *box, const double o[3], const double d[3], double stretch,
                    const pl_footprint *footprint, pl_span within, double t_min, double t_max, double *t_entry,
                    pl_span *inside);
+
+/* [t_enter, t_leave] of the box within `within`: an instance that this leaves nothing of is missed. */
+pl_span pl_gate_span(const pl_gate_box *gate, const double o[3], const double d[3], pl_span within);
 
 /* *inside of an open gate; nothing (enter > leave) only where the instance is missed. */
 pl_span pl_span_below(const pl_gate_box *gate, const double o[3], const double d[3], pl_span within);

@@ -1,17 +1,25 @@
-/* hull.c - the supports of sets in 26 directions (hull.h). */
+/* hull.c - the supports of sets in 98 directions (hull.h). */
 #include "hull.h"
 
 #include <float.h>
+#include <string.h>
+
+#include "elementary.h"
 
 #define ROUNDINGS (64.0 * DBL_EPSILON)
 
-static const int strides[3] = {9, 3, 1};
+enum { N = PL_HULL_N, SIDE = PL_HULL_SIDE };
 
-static void direction_of(int cell, double direction[3])
+static const int strides[3] = {SIDE * SIDE, SIDE, 1};
+
+/* false: not on the surface. */
+static bool direction_of(int cell, double direction[3])
 {
-    direction[0] = cell / 9 - 1;
-    direction[1] = cell / 3 % 3 - 1;
-    direction[2] = cell % 3 - 1;
+    const int x = cell / (SIDE * SIDE) - N, y = cell / SIDE % SIDE - N, z = cell % SIDE - N;
+    direction[0] = x;
+    direction[1] = y;
+    direction[2] = z;
+    return x == -N || x == N || y == -N || y == N || z == -N || z == N;
 }
 
 static pl_hull hull_with(double support)
@@ -33,7 +41,7 @@ pl_hull pl_hull_of_box(const pl_box *box)
         double d[3], sum = 0.0, size = 0.0;
         direction_of(i, d);
         for (int axis = 0; axis < 3; axis++) {
-            const double plane = d[axis] > 0.0 ? box->hi[axis] : d[axis] < 0.0 ? -box->lo[axis] : 0.0;
+            const double plane = d[axis] > 0.0 ? d[axis] * box->hi[axis] : d[axis] < 0.0 ? d[axis] * box->lo[axis] : 0.0;
             sum += plane;
             size += fabs(plane);
         }
@@ -49,8 +57,7 @@ pl_hull pl_hull_of_shape(const pl_shape *shape, const double *arguments)
     const double slack = 3.0 * ROUNDINGS * pl_box_reach(&box);
     for (int i = 0; i < PL_HULL_CELLS; i++) {
         double d[3];
-        direction_of(i, d);
-        hull.support[i] = i == PL_HULL_MIDDLE ? 0.0 : shape->support(arguments, d) + slack;
+        if (direction_of(i, d)) hull.support[i] = shape->support(arguments, d) + slack;
     }
     return hull;
 }
@@ -78,29 +85,29 @@ void pl_hull_meet(pl_hull *hull, const pl_hull *other)
         if (other->support[i] < hull->support[i]) hull->support[i] = other->support[i];
 }
 
-/* The largest of all supports. */
+/* Of all coordinates. */
 static double reach_of(const pl_hull *hull)
 {
-    double reach = 0.0;
-    for (int i = 0; i < PL_HULL_CELLS; i++)
-        if (i != PL_HULL_MIDDLE) reach = fmax(reach, fabs(hull->support[i]));
-    return reach;
+    const pl_box box = pl_hull_box(hull);
+    return pl_box_reach(&box);
 }
 
+/* v lies between three directions of the lattice: those at the corners of half a square of the surface. */
 static double support_along(const pl_hull *hull, double reach, const double v[3])
 {
     const double a[3] = {fabs(v[0]), fabs(v[1]), fabs(v[2])};
-    int most = a[1] > a[0], least = !most;
-    if (a[2] > a[most]) most = 2;
-    else if (!(a[2] > a[least])) least = 2;
-    const int middle = 3 - most - least;
-    int cell = PL_HULL_MIDDLE + (v[most] < 0.0 ? -strides[most] : strides[most]);
-    double sum = (a[most] - a[middle]) * hull->support[cell];
-    cell += v[middle] < 0.0 ? -strides[middle] : strides[middle];
-    sum += (a[middle] - a[least]) * hull->support[cell];
-    cell += v[least] < 0.0 ? -strides[least] : strides[least];
-    sum += a[least] * hull->support[cell];
-    return sum + ROUNDINGS * reach * a[most];
+    const int first = a[1] > a[0], most = a[2] > a[first] ? 2 : first, second = most == 2 ? 0 : !first, third = 3 - most - second;
+    if (!(a[most] > 0.0)) return 0.0;
+    const double in_cells = N / a[most];
+    double x = a[second] * in_cells, y = a[third] * in_cells;
+    const int column = x < N ? (int)x : N - 1, row = y < N ? (int)y : N - 1;
+    const int right = v[second] < 0.0 ? -strides[second] : strides[second], up = v[third] < 0.0 ? -strides[third] : strides[third];
+    const double *h = hull->support + PL_HULL_MIDDLE + (v[most] < 0.0 ? -N : N) * strides[most] + column * right + row * up;
+    x -= column;
+    y -= row;
+    const double sum = x >= y ? (1.0 - x) * h[0] + (x - y) * h[right] + y * h[right + up]
+                              : (1.0 - y) * h[0] + (y - x) * h[up] + x * h[right + up];
+    return sum * (a[most] / N) + ROUNDINGS * reach * a[most];
 }
 
 /* The support in direction d of the set mapped. */
@@ -123,8 +130,7 @@ void pl_hull_through(const pl_affine *to_parent, pl_hull *hull)
     const double reach = reach_of(&below);
     for (int i = 0; i < PL_HULL_CELLS; i++) {
         double d[3];
-        direction_of(i, d);
-        hull->support[i] = support_under(to_parent, &below, reach, d);
+        if (direction_of(i, d)) hull->support[i] = support_under(to_parent, &below, reach, d);
     }
 }
 
@@ -142,29 +148,131 @@ pl_box pl_hull_box_under(const pl_affine *to_parent, const pl_hull *hull)
     return box;
 }
 
+/* --- maps that are known by ranges --- */
+
+/* The corners of a polytope of linear parts and translations that holds all maps of a range: a support is
+ * convex in the map, so it is largest at a corner. */
+enum { MOST_CORNERS = 64, ARC = 18 };
+
+typedef struct corners {
+    pl_affine list[MOST_CORNERS];
+    int count;
+    double largest; /* entry on the way: roundings are in proportion to it */
+} corners;
+
+/* Replaces each corner by `ways` of it, the first ones last. false: too many. */
+static bool multiply_corners(corners *c, int ways)
+{
+    if (c->count * ways > MOST_CORNERS) return false;
+    for (int way = 1; way < ways; way++) memcpy(c->list + way * c->count, c->list, (size_t)c->count * sizeof *c->list);
+    c->count *= ways;
+    return true;
+}
+
+/* Columns i and j are turned by an arc, whose polygon has its ends and, between tangents, a corner each `ARC` degrees. */
+static bool rotate_corners(corners *c, int i, int j, pl_range degrees)
+{
+    const double width = fmin(degrees.hi - degrees.lo, 360.0);
+    const int before = c->count, tangents = (int)ceil(width / ARC), ends = width < 360.0 ? width > 0.0 ? 2 : 1 : 0;
+    if (!multiply_corners(c, tangents + ends)) return false;
+    for (int k = 0; k < c->count; k++) {
+        const int way = k / before;
+        double *m = c->list[k].m, at = way == tangents ? degrees.lo : degrees.hi, radius = 1.0, sine, cosine;
+        if (way < tangents) {
+            at = degrees.lo + width / tangents * (way + 0.5);
+            radius = (1.0 + 1e-9) / pl_cos(0.5 * width / tangents);
+        }
+        sine = radius * pl_sin(at);
+        cosine = radius * pl_cos(at);
+        for (int row = 0; row < 12; row += 4) {
+            const double a = m[row + i], b = m[row + j];
+            m[row + i] = a * cosine + b * sine;
+            m[row + j] = b * cosine - a * sine;
+        }
+    }
+    return true;
+}
+
+static bool scale_corners(corners *c, const pl_range factors[3], bool uniform)
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const int before = c->count;
+        if (uniform && axis) break;
+        if (!multiply_corners(c, pl_range_is_point(factors[axis]) ? 1 : 2)) return false;
+        for (int k = 0; k < c->count; k++)
+            for (int entry = 0; entry < 12; entry++)
+                if (uniform ? entry % 4 != 3 : entry % 4 == axis) c->list[k].m[entry] *= k < before ? factors[axis].lo : factors[axis].hi;
+    }
+    return true;
+}
+
+static bool move_corners(corners *c, const pl_range by[3])
+{
+    for (int axis = 0; axis < 3; axis++) {
+        const int before = c->count;
+        if (!multiply_corners(c, pl_range_is_point(by[axis]) ? 1 : 2)) return false;
+        for (int k = 0; k < c->count; k++)
+            for (int row = 0; row < 12; row += 4) c->list[k].m[row + 3] += c->list[k].m[row + axis] * (k < before ? by[axis].lo : by[axis].hi);
+    }
+    return true;
+}
+
+/* false: the operations aren't known, or there are too many corners. */
+static bool corners_of_steps(const pl_range_map *map, corners *c)
+{
+    bool ok = map->step_count >= 0;
+    c->list[0] = pl_affine_identity();
+    c->count = 1;
+    c->largest = 1.0;
+    for (int i = 0; ok && i < map->step_count; i++) {
+        const pl_range *a = map->steps[i].arguments;
+        switch (map->steps[i].opcode) {
+        case PL_OP_TRANS: ok = move_corners(c, a); break;
+        case PL_OP_ROTX: ok = rotate_corners(c, 1, 2, a[0]); break;
+        case PL_OP_ROTY: ok = rotate_corners(c, 2, 0, a[0]); break;
+        case PL_OP_ROTZ: ok = rotate_corners(c, 0, 1, a[0]); break;
+        default: ok = scale_corners(c, a, map->steps[i].opcode == PL_OP_SCALE_UNIFORM); break;
+        }
+        for (int k = 0; ok && k < c->count; k++)
+            for (int entry = 0; entry < 12; entry++) c->largest = fmax(c->largest, fabs(c->list[k].m[entry]));
+    }
+    return ok;
+}
+
+/* The support in direction d below a matrix of ranges, a bound that knows nothing of how its entries belong together. */
+static double support_under_entries(const pl_range_map *map, const pl_hull *below, double reach, const double d[3])
+{
+    double lo[4], hi[4], size = 0.0, largest = -INFINITY;
+    for (int column = 0; column < 4; column++) {
+        lo[column] = hi[column] = 0.0;
+        for (int r = 0; r < 3; r++) {
+            const pl_range entry = map->m[4 * r + column];
+            if (d[r] == 0.0) continue;
+            lo[column] += d[r] > 0.0 ? d[r] * entry.lo : d[r] * entry.hi;
+            hi[column] += d[r] > 0.0 ? d[r] * entry.hi : d[r] * entry.lo;
+            size += fabs(d[r]) * (column == 3 ? 1.0 : reach) * fmax(fabs(entry.lo), fabs(entry.hi));
+        }
+    }
+    for (int corner = 0; corner < 8; corner++) {
+        const double at[3] = {corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1], corner & 4 ? hi[2] : lo[2]};
+        const bool again = (corner & 1 && lo[0] == hi[0]) || (corner & 2 && lo[1] == hi[1]) || (corner & 4 && lo[2] == hi[2]);
+        if (!again) largest = fmax(largest, support_along(below, reach, at));
+    }
+    return largest + hi[3] + ROUNDINGS * size;
+}
+
 void pl_hull_through_range(const pl_range_map *map, pl_hull *hull)
 {
     const pl_hull below = *hull;
     const double reach = reach_of(&below);
+    corners c;
+    const bool known = corners_of_steps(map, &c);
     for (int i = 0; i < PL_HULL_CELLS; i++) {
-        double d[3], lo[4], hi[4], size = 0.0, largest = -INFINITY;
-        direction_of(i, d);
-        for (int column = 0; column < 4; column++) {
-            lo[column] = hi[column] = 0.0;
-            for (int r = 0; r < 3; r++) {
-                const pl_range entry = map->m[4 * r + column];
-                if (d[r] == 0.0) continue;
-                lo[column] += d[r] > 0.0 ? entry.lo : -entry.hi;
-                hi[column] += d[r] > 0.0 ? entry.hi : -entry.lo;
-                size += (column == 3 ? 1.0 : reach) * fmax(fabs(entry.lo), fabs(entry.hi));
-            }
-        }
-        for (int corner = 0; corner < 8; corner++) {
-            const double at[3] = {corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1], corner & 4 ? hi[2] : lo[2]};
-            const bool again = (corner & 1 && lo[0] == hi[0]) || (corner & 2 && lo[1] == hi[1]) || (corner & 4 && lo[2] == hi[2]);
-            if (!again) largest = fmax(largest, support_along(&below, reach, at));
-        }
-        const double sum = largest + hi[3] + ROUNDINGS * size;
+        double d[3], sum = -INFINITY;
+        if (!direction_of(i, d)) continue;
+        if (!known) sum = support_under_entries(map, &below, reach, d);
+        for (int k = 0; known && k < c.count; k++) sum = fmax(sum, support_under(&c.list[k], &below, reach, d));
+        if (known) sum += 16.0 * ROUNDINGS * N * c.largest * (1.0 + 3.0 * reach);
         hull->support[i] = isnan(sum) ? INFINITY : sum;
     }
 }
@@ -173,8 +281,8 @@ pl_box pl_hull_box(const pl_hull *hull)
 {
     pl_box box;
     for (int axis = 0; axis < 3; axis++) {
-        box.lo[axis] = -hull->support[PL_HULL_MIDDLE - strides[axis]];
-        box.hi[axis] = hull->support[PL_HULL_MIDDLE + strides[axis]];
+        box.lo[axis] = -hull->support[PL_HULL_MIDDLE - N * strides[axis]] / N;
+        box.hi[axis] = hull->support[PL_HULL_MIDDLE + N * strides[axis]] / N;
     }
     return box;
 }

@@ -175,6 +175,7 @@ static void identity(pl_range_map *map)
 {
     for (int i = 0; i < 12; i++) map->m[i] = pl_range_of(i % 5 == 0 ? 1.0 : 0.0);
     map->stretch = map->inverse_stretch = 1.0;
+    map->step_count = 0;
 }
 
 /* Entries of matrices: zeros and ones, of which there are many, stay exact. */
@@ -254,6 +255,16 @@ static void general_step(pl_range_map *map, const pl_range step[12])
     multiply(map, step);
 }
 
+static void note_step(pl_range_map *map, uint8_t opcode, const pl_range *a)
+{
+    const bool simple = opcode >= PL_OP_TRANS && opcode <= PL_OP_SCALE_UNIFORM && opcode != PL_OP_ROT;
+    if (!simple || map->step_count == PL_RANGE_STEPS) map->step_count = -1;
+    if (map->step_count < 0) return;
+    pl_range_step *step = &map->steps[map->step_count++];
+    step->opcode = opcode;
+    for (int i = 0; i < 3; i++) step->arguments[i] = i < pl_op_row_of(opcode)->pops ? a[i] : a[0];
+}
+
 /* M := M · step; false: nothing is known. */
 static bool transform(pl_range_map *map, uint8_t opcode, const pl_range *a)
 {
@@ -261,6 +272,7 @@ static bool transform(pl_range_map *map, uint8_t opcode, const pl_range *a)
     for (int i = 0; i < 12; i++) step[i] = pl_range_of(i % 5 == 0 ? 1.0 : 0.0);
     for (int i = 0; i < pl_op_row_of(opcode)->pops; i++)
         if (!(isfinite(a[i].lo) && isfinite(a[i].hi))) return false;
+    note_step(map, opcode, a);
     switch (opcode) {
     case PL_OP_TRANS:
         for (int r = 0; r < 3; r++) {
@@ -337,6 +349,7 @@ static bool run_both(machine *m, const uint8_t *there, const uint8_t *here, pl_r
     for (uint32_t i = 0; i < first.count; i++)
         m->result->values[i] = pl_range_join(m->result->values[i], first.values[i]);
     for (int i = 0; i < 12; i++) m->result->map.m[i] = pl_range_join(m->result->map.m[i], first.map.m[i]);
+    m->result->map.step_count = -1;
     m->result->map.stretch = fmax(m->result->map.stretch, first.map.stretch);
     m->result->map.inverse_stretch = fmax(m->result->map.inverse_stretch, first.map.inverse_stretch);
     return true;

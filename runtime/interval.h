@@ -16,11 +16,23 @@ typedef struct pl_range {
     double lo, hi;
 } pl_range;
 
+/* Operations of a transformation that can be followed one by one: more are followed as a matrix of ranges. */
+enum { PL_RANGE_STEPS = 8 };
+
+/* PL_OP_TRANS, a rotation about an axis or a scaling, with its arguments. */
+typedef struct pl_range_step {
+    uint8_t opcode;
+    pl_range arguments[3];
+} pl_range_step;
+
 /* A matrix that isn't known exactly, row by row as pl_affine, with what bounds of rounding errors need: the largest stretch
- * of any such matrix and of its inverse, and the length of its translation. */
+ * of any such matrix and of its inverse. And, where they are known, the operations whose product it is, the outermost first: ranges
+ * of its entries don't tell that the columns of a rotation are unit vectors. */
 typedef struct pl_range_map {
     pl_range m[12];
     double stretch, inverse_stretch;
+    int step_count; /* -1: unknown */
+    pl_range_step steps[PL_RANGE_STEPS];
 } pl_range_map;
 
 typedef struct pl_range_result {

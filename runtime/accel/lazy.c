@@ -280,7 +280,7 @@ static bool pass_gate(pl_tracer *tracer, const pl_lazy_item *it, frame *f, pl_qu
     for (uint32_t i = 0; i < it->transform_count; i++) f->stretch *= stretches[i];
     if (gate->unbounded) return true;
     const pl_span all = {query->t_min, query->t_max};
-    const pl_span own = pl_span_below(gate, f->o, f->d, all);
+    const pl_span own = pl_gate_span(gate, f->o, f->d, all);
     if (!(own.enter <= own.leave)) return false;
     f->leave = own.leave;
     return is_open(w, gate->diameter * f->stretch, own.leave) || decide(tracer, it, f, query, ok) == PL_GATE_OPEN;
