@@ -3,6 +3,7 @@
 import ctypes
 import platform
 import subprocess
+from pathlib import Path
 
 import native
 import numpy as np
@@ -25,19 +26,23 @@ def arguments(count: int) -> list[np.ndarray]:
     return [chosen.permutation(np.concatenate(sizes)) for _ in range(count)]
 
 
-@pytest.mark.parametrize("flags", FLAGS, ids=" ".join)
-def test_same_bits(flags, tmp_path):
-    library = tmp_path / "elementary.so"
+def library(flags: tuple[str, ...], folder: Path) -> ctypes.CDLL:
+    path = folder / "elementary.so"
     command = ["cc", "-std=gnu11", "-ffp-contract=off", "-fPIC", "-shared", *flags, f"-I{native.RUNTIME}"]
     command += [
         f"-I{native.RUNTIME / 'include'}",
         "-o",
-        str(library),
+        str(path),
         str(native.RUNTIME / "elementary.c"),
         "-lm",
     ]
     subprocess.run(command, check=True, capture_output=True)
-    function = ctypes.CDLL(str(library)).pl_elementary_array
+    return ctypes.CDLL(str(path))
+
+
+@pytest.mark.parametrize("flags", FLAGS, ids=" ".join)
+def test_same_bits(flags, tmp_path):
+    function = library(flags, tmp_path).pl_elementary_array
     function.argtypes = (ctypes.c_int, ctypes.c_size_t, *(ctypes.c_void_p,) * 4)
     for name in sorted(elementary.PURE):
         inputs = arguments(OPCODES[name].pops)
@@ -47,3 +52,16 @@ def test_same_bits(flags, tmp_path):
         expected = elementary.apply_array(name, *inputs)
         same = (out.view(np.uint64) == expected.view(np.uint64)) | (np.isnan(out) & np.isnan(expected))
         assert same.all(), name
+
+
+def test_sine_and_cosine_together_have_the_bits_of_each_alone(tmp_path):
+    """Which are computed without the instructions that the two together use where there are any."""
+    both = library(("-O2",), tmp_path).pl_sin_cos
+    angles = np.concatenate([arguments(1)[0], np.arange(-720.0, 721.0, 7.5), [0.0, -0.0, 1e-300]])
+    sine, cosine = ctypes.c_double(), ctypes.c_double()
+    found = []
+    for angle in angles:
+        both(ctypes.c_double(angle), ctypes.byref(sine), ctypes.byref(cosine))
+        found.append((sine.value, cosine.value))
+    for name, column in zip(("sin", "cos"), np.array(found).T):
+        np.testing.assert_array_equal(column.view(np.uint64), getattr(elementary, name)(angles).view(np.uint64))
