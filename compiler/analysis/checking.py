@@ -33,6 +33,7 @@ from . import telling
 from .exchange import Answer, NewBlock, Request
 from .facts import drop_facts, facts_of
 from .interruption import Interrupted, Interruption
+from .keeping import Kept, hand_over
 from .parts import Part, Parts, role_of
 from .split import Shape
 from .text import Block
@@ -94,6 +95,7 @@ class SceneState:
         parts = set(self.parts)
         if removed or added:
             self.parts.change(removed, added)
+            hand_over(parts, self.parts, removed, added)
         for block in removed:
             block.__dict__["is_gone"] = True
             drop_facts(block)
@@ -196,7 +198,7 @@ class Work:
             order, places = scene.in_order(), scene.places()
             for part in _steps(scene, order, self.interruption):
                 now = time.perf_counter()
-                if part is not None:
+                if part is not None and part.outcome is not None:
                     new[part] = None
                 is_paused = part is not None and must_pause()
                 if new and (part is None or is_paused or now - told_at > SLICE_S):
@@ -217,11 +219,11 @@ def _steps(scene: SceneState, order: dict[Block, int], interruption: Interruptio
     for parts in (scene.fresh, [every[0], *reversed(every[1:])]):
         for part in parts:
             if part.outcome is None:
-                part.outcome = _checked(scene, part, order)
+                _check(scene, part, order, interruption)
                 yield part
         yield None
         for part in parts:
-            if part.outcome.model is not None:
+            if part.outcome is not None and part.outcome.model is not None:
                 _predict(part.outcome, interruption)
                 yield part
         if any(map(_is_due, every)):
@@ -235,6 +237,18 @@ def _is_due(part: Part) -> bool:
 def _share(scene: SceneState) -> float:
     parts = list(scene.parts)
     return 1 - sum(map(_is_due, parts)) / len(parts)
+
+
+def _check(scene: SceneState, part: Part, order: dict[Block, int], interruption: Interruption) -> None:
+    """Work out messages; where most of that is kept, unless interrupted."""
+    if part.memory is None:
+        part.outcome = _checked(scene, part, order)
+        return
+    try:
+        with interruption.allowed():
+            part.outcome = _checked(scene, part, order)
+    except Interrupted:
+        part.outcome = None
 
 
 def _checked(scene: SceneState, part: Part, order: dict[Block, int]) -> Outcome:
@@ -251,14 +265,16 @@ def _checked(scene: SceneState, part: Part, order: dict[Block, int]) -> Outcome:
     try:
         first = next(iter(scene.blocks.values()))[0]  # the root's: of other files, what nothing uses isn't said
         start = Span(first, 0, len(first.data))
-        model = resolve(syntax.File(start, tuple(definitions)), diagnostics)
+        kept = part.memory or Kept()
+        model = resolve(syntax.File(start, tuple(definitions)), diagnostics, meanings=kept.meanings if part.memory else None)
         late = [each for each in diagnostics.items if each.code in LATE_CODES]
         before, is_broken = len(diagnostics.items), diagnostics.has_errors
         if not is_broken:
             if not model.objects and scene.objects:
                 # The scene has objects, though this part has none.
                 model.objects.append(SceneObject("", 0, Empty(), start))
-            check(model, diagnostics)
+            check(model, diagnostics, kept.answers)
+            kept.answers.end_round()
     except (PlsysError, RecursionError):
         return Outcome([], True, None)  # a limit of the compiler's that `plsys check` reports
     found = [*late, *diagnostics.items[before:]]

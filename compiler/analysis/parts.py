@@ -24,12 +24,13 @@ _GENERAL = frozenset(("camera", "light_source", "background", "global_settings")
 
 
 class Role(NamedTuple):
-    """``kind``: tied, shared or general; the scene's names that the block uses, and those that it defines or assigns;
-    whether it places objects and whether it includes files. All that has to be known of a block that isn't checked."""
+    """``kind``: tied, shared or general; the scene's names that the block uses, those that it defines or assigns,
+    and those that it assigns; whether it places objects and whether it includes files. All that has to be known of a block that isn't checked."""
 
     kind: str
     names: frozenset[str]
     defined: frozenset[str]
+    assigned: frozenset[str]
     places: bool
     includes: bool
 
@@ -43,7 +44,8 @@ def role_of(block: Block) -> Role:
 
 
 def _role(facts: Facts) -> Role:
-    defined = {each.name for each in facts.definitions} | {each.name for each in facts.assigned}
+    assigned = {each.name for each in facts.assigned}
+    defined = {each.name for each in facts.definitions} | assigned
     names = {each.name for each in facts.names if not vocabulary.kind_of(each.name)}
     kind = "tied"
     if all(each.name.name in _GENERAL for each in facts.blocks) and not facts.is_broken:
@@ -52,7 +54,7 @@ def _role(facts: Facts) -> Role:
         elif not facts.blocks and all(_is_shared(each, names - defined) for each in facts.definitions):
             kind = "shared"
     places = any(each.name.name in OBJECT_BLOCKS for each in facts.blocks)
-    return Role(kind, frozenset(names), frozenset(defined), places, bool(facts.includes))
+    return Role(kind, frozenset(names), frozenset(defined), frozenset(assigned), places, bool(facts.includes))
 
 
 def _is_shared(definition: Any, read: set[str]) -> bool:
@@ -63,10 +65,12 @@ def _is_shared(definition: Any, read: set[str]) -> bool:
 
 @dataclass(eq=False)
 class Part:
-    """``blocks`` are its own; ``outcome`` is what checking it gave, None while that is due."""
+    """``blocks`` are its own; ``outcome`` is what checking it gave, None while that is due; ``memory`` is what is kept of a
+    large part from one check to the next."""
 
     blocks: list[Block]
     outcome: Any = field(default=None, repr=False)
+    memory: Any = field(default=None, repr=False)
 
 
 class Parts:
@@ -182,4 +186,4 @@ class Parts:
                     if block not in found:
                         found[block] = None
                         queue.append(block)
-        return {block: None for block in found if block not in part.blocks}
+        return {block: None for block in found if self._part_of.get(block) is not part}

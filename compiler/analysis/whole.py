@@ -32,7 +32,6 @@ from .parts import role_of
 from .scene import Scene
 from .text import Block
 
-
 # The worker keeps what it found out about so many scenes.
 MAX_KNOWN = 16
 

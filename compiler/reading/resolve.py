@@ -19,6 +19,7 @@ from typing import Callable
 
 from . import meshes, syntax
 from .diagnostics import Diagnostics, nearest
+from .meanings import Meanings
 from .model import Constant, Input, Mesh, Model, Record, SceneObject
 from .problems import Problem
 from .resolve_blocks import Blocks, Values
@@ -42,14 +43,17 @@ def resolve(
     parameters: dict[str, float] | None = None,
     seed: float | None = None,
     loader: Callable[[Path], Source] = Source.read,
+    meanings: Meanings | None = None,
 ) -> Model:
     """The model of ``file`` and of what it includes.
 
     ``parameters`` sets ``Parameter`` inputs by name; ``seed`` overrides the scene's. ``loader`` reads included
-    files (an editor gives what it has open) and raises OSError. Messages are added to ``diagnostics``; nothing
-    is raised for what a scene holds.
+    files (an editor gives what it has open) and raises OSError. ``meanings`` are kept from one time to the next.
+    Messages are added to ``diagnostics``; nothing is raised for what a scene holds.
     """
-    return Resolver(file, diagnostics, dict(parameters or {}), seed, loader).run()
+    resolver = Resolver(file, diagnostics, dict(parameters or {}), seed, loader)
+    resolver.names.meanings = meanings
+    return resolver.run()
 
 
 class Resolver:
@@ -76,8 +80,10 @@ class Resolver:
         self.blocks = Blocks(self.names, self.expressions, self.textures)
         self.settings: Values = {}
         self.mesh_files: dict[Path, int] = {}
+        self.placed: dict[str, int] = {}  # how many objects place each symbol
 
     def run(self) -> Model:
+        self.names.leads_to, self.names.has_same_edges = self.terms.leads_to, self.terms.has_same_edges
         self.names.gather(self.file)
         model, entries = self.model, self.names.entries
         model.files = self.names.files
@@ -98,6 +104,8 @@ class Resolver:
             self.names.reporting(lambda: self.force(entry), None)
         if self.settings:
             model.settings = Record("settings", tuple(self.settings.items()))
+        if self.names.meanings is not None:
+            self.names.meanings.edges = self.terms.edges()
         return model
 
     # --- settings and the seed
@@ -111,6 +119,8 @@ class Resolver:
             self.seed = self.settings.get("seed", (0.0,))[0]
         else:
             self.settings["seed"] = (float(self.seed),)
+        if self.names.meanings is not None:
+            self.names.meanings.use_seed(self.seed)
 
     def seed_of(self, span: Span) -> float:
         if self.seed is None:
@@ -216,8 +226,9 @@ class Resolver:
             )
 
     def place(self, block: syntax.Block) -> None:
-        for symbol, operand in split(self.objects.object(block)):
-            ordinal = sum(1 for other in self.model.objects if other.symbol == symbol)
+        for symbol, operand in self.names.known(block, lambda: tuple(split(self.objects.object(block)))):
+            ordinal = self.placed.get(symbol, 0)
+            self.placed[symbol] = ordinal + 1
             self.model.objects.append(SceneObject(symbol, ordinal, operand, block.span))
 
     def _unknown_block(self, block: syntax.Block) -> Problem:
@@ -262,6 +273,7 @@ class Resolver:
     # --- meshes
 
     def add_mesh(self, mesh: Mesh) -> int:
+        self.names.record.is_lasting = False  # its number is this model's
         self.model.meshes.append(mesh)
         return len(self.model.meshes) - 1
 
@@ -271,6 +283,7 @@ class Resolver:
             raise Problem(
                 "wrong-arguments", call.span, "mesh takes the name of a file", 'write mesh("leaf.obj")'
             )
+        self.names.record.is_lasting = False
         text = call.arguments[0]
         base = text.span.source.path
         path = (base.parent if base is not None else Path()) / text.value

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Callable, Iterable, Iterator, Sequence, TypeVar
+from typing import Callable, Hashable, Iterable, Iterator, Sequence, TypeVar
 
 from . import syntax, vocabulary
 from .diagnostics import Diagnostics, Note, nearest
+from .meanings import Meaning, Meanings, Record
 from .model import Definition
 from .problems import Problem, synonym, truth, unsupported
 from .source import Source, Span
@@ -87,13 +88,19 @@ class Entry:
 
 @dataclass
 class Names:
-    """The namespace. ``blocks`` are the scene blocks of all files in order, ``files`` the files read."""
+    """The namespace. ``blocks`` are the scene blocks of all files in order, ``files`` the files read. ``meanings`` are those
+    of definitions that were resolved before; to take one over, it is asked whether a Selection still ``leads_to`` another,
+    unless the scene ``has_same_edges`` as before."""
 
     diagnostics: Diagnostics
     loader: Callable[[Path], Source]
     entries: dict[str, Entry] = field(default_factory=dict)
     blocks: list[syntax.Block] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
+    meanings: Meanings | None = None
+    leads_to: Callable[[str, str], bool] = field(default=lambda name, other: False)
+    has_same_edges: Callable[[], bool] = field(default=lambda: False)
+    record: Record = field(default_factory=Record)
     _open: list[tuple[Path, Span]] = field(default_factory=list)
 
     # --- gathering
@@ -216,6 +223,35 @@ class Names:
             problem.report(self.diagnostics)
             return fallback
 
+    # --- what was resolved before
+
+    def known(self, node: syntax.Node, make: Callable[[], T], *given: Hashable) -> T:
+        """What ``make`` makes of ``node`` and what is ``given``, or what it made before if that still holds."""
+        if self.meanings is None:
+            return make()
+        meaning = self.meanings.recall(node, *given)
+        if meaning is not None and self._still_holds(meaning):
+            for name, span in meaning.references:
+                self.entries[name].definition.references.append(span)
+            return meaning.value
+        outer, self.record, before = self.record, Record(), len(self.diagnostics.items)
+        try:
+            value = make()
+        finally:
+            record, self.record = self.record, outer
+            outer.is_lasting &= record.is_lasting
+        if record.is_lasting and len(self.diagnostics.items) == before:
+            self.meanings.keep(node, Meaning(value, tuple(record.references), tuple(record.reached)), *given)
+        return value
+
+    def _still_holds(self, meaning: Meaning) -> bool:
+        return self.has_same_edges() or all(self.leads_to(name, other) is answer for name, other, answer in meaning.reached)
+
+    def refer(self, entry: Entry, span: Span) -> None:
+        """Note that ``entry`` is used at ``span``."""
+        entry.definition.references.append(span)
+        self.record.references.append((entry.definition.name, span))
+
     # --- looking up
 
     def find(self, name: syntax.Name, kinds: tuple[str, ...], wanted: str) -> Entry:
@@ -226,7 +262,7 @@ class Names:
         entry = self.entries.get(name.name)
         if entry is None:
             raise self.unknown(name, kinds, wanted)
-        entry.definition.references.append(name.span)
+        self.refer(entry, name.span)
         if entry.kind not in kinds:
             note = Note(entry.definition.span, f"'{name.name}' is defined here")
             message = f"'{name.name}' is {ARTICLES[entry.kind]}, not {wanted}"

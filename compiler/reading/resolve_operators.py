@@ -35,7 +35,7 @@ class Operators:
         if entry.value is None:
             node = entry.node
             assert isinstance(node, syntax.Calculation | syntax.Transformation)
-            entry.value = self._definition(node)
+            entry.value = self.names.known(node, lambda: self._definition(node))
         return entry.value  # type: ignore[return-value]
 
     def _definition(self, node: syntax.Calculation | syntax.Transformation) -> Operator:
@@ -102,7 +102,7 @@ class Operators:
         else:
             value = self.expressions.number(node.value, RULES)
         if node.operator != "=":
-            entry.definition.references.append(node.target.span)
+            self.names.refer(entry, node.target.span)
             value = Apply(UPDATES[node.operator], (Read(name, node.target.span), value), node.span)
         return Assign(name, value, node.span)
 

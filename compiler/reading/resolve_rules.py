@@ -39,9 +39,13 @@ class Rules:
 
     def selection(self, node: syntax.Selection) -> Symbol:
         """The symbol that ``node`` defines. Problems are reported, and what has one becomes Empty."""
+        first = self.rules
+        firsts = [self._numbered(production) for production in node.productions]
+        return self.names.known(node, lambda: self._selection(node, firsts), first)
+
+    def _selection(self, node: syntax.Selection, firsts: list[int]) -> Symbol:
         rest: Production = Empty(node.span)
         last = len(node.productions) - 1
-        firsts = [self._numbered(production) for production in node.productions]
         for i in range(last, -1, -1):
             production = node.productions[i]
             if i < last and _always_applies(production):

@@ -13,6 +13,7 @@ from typing import Callable
 
 from . import syntax, vocabulary
 from .diagnostics import Note
+from .meanings import Record
 from .model import (
     Assign,
     Calculate,
@@ -50,7 +51,9 @@ class Terms:
         self.names, self.expressions, self.operators = names, expressions, operators
         self.textures, self.mesh = textures, mesh
         self._entry_actions: dict[str, tuple[Operator, ...]] = {}
-        self._reached: dict[str, frozenset[str]] | None = None
+        self._all_edges: dict[str, set[str]] | None = None
+        self._same_edges: bool | None = None
+        self._reached: dict[str, frozenset[str]] = {}
 
     def union(self, node: syntax.Union, owner: str) -> Operand:
         terms = tuple(
@@ -159,7 +162,7 @@ class Terms:
         assert isinstance(node, syntax.Selection)
         name = entry.definition.name
         operand: Operand = Enter(name, span)
-        if not owner or owner not in self.reached(name):
+        if not owner or not self.leads_to(name, owner):
             for operator in reversed(self.entry_action(node)):
                 operand = Prefixed(operator, operand, span)
         if len(arguments) != len(node.parameters) and node.is_whole:
@@ -185,7 +188,9 @@ class Terms:
         if name not in self._entry_actions:
             self._entry_actions[name] = ()
             if node.entry is not None:
+                outer, self.names.record = self.names.record, Record()  # it isn't part of what asks first
                 self._entry_actions[name] = self.names.reporting(lambda: self._entry_action(node), ())
+                self.names.record = outer
         return self._entry_actions[name]
 
     def _entry_action(self, node: syntax.Selection) -> tuple[Operator, ...]:
@@ -202,44 +207,52 @@ class Terms:
                 operators.append(operator)
         return tuple(operators)
 
+    def leads_to(self, name: str, other: str) -> bool:
+        """Whether productions lead from one Selection to another, or through a cycle to itself."""
+        answer = other in self.reached(name)
+        self.names.record.reached.append((name, other, answer))
+        return answer
+
     def reached(self, name: str) -> frozenset[str]:
         """The Selections that productions lead to from ``name``; itself only through a cycle."""
-        if self._reached is None:
-            self._reached = _closure(self._edges())
+        if name not in self._reached:
+            edges = self.edges()
+            found: set[str] = set()
+            waiting = list(edges[name])
+            while waiting:
+                other = waiting.pop()
+                if other not in found:
+                    found.add(other)
+                    waiting += edges[other]
+            self._reached[name] = frozenset(found)
         return self._reached[name]
 
-    def _edges(self) -> dict[str, set[str]]:
-        edges: dict[str, set[str]] = {}
-        for name, entry in self.names.entries.items():
-            if isinstance(entry.node, syntax.Selection):
-                found = edges.setdefault(name, set())
-                for term in terms_of(entry.node):
-                    if term is entry.node.entry or not term.items:
-                        continue
-                    last = term.items[-1]
-                    target = last.name if isinstance(last, syntax.Call) else last
-                    if isinstance(target, syntax.Name) and self._is(target, "selection"):
-                        found.add(target.name)
-        return edges
+    def has_same_edges(self) -> bool:
+        """Whether Selections lead to each other as they did when their meanings were kept."""
+        if self._same_edges is None:
+            self._same_edges = self.names.meanings is not None and self.names.meanings.edges == self.edges()
+        return self._same_edges
+
+    def edges(self) -> dict[str, set[str]]:
+        """The Selections that each one's productions end with."""
+        if self._all_edges is None:
+            meanings, self._all_edges = self.names.meanings, {}
+            for name, entry in self.names.entries.items():
+                if isinstance(node := entry.node, syntax.Selection):
+                    named = meanings.once(node, "ends", lambda: _ends(node)) if meanings is not None else _ends(node)
+                    self._all_edges[name] = {end.name for end in named if self._is(end, "selection")}
+        return self._all_edges
 
     def _is(self, name: syntax.Name, kind: str) -> bool:
         entry = self.names.entries.get(name.name)
         return entry is not None and entry.kind == kind
 
 
-def _closure(edges: dict[str, set[str]]) -> dict[str, frozenset[str]]:
-    """The transitive closure of one step and more."""
-    reached = {}
-    for start in edges:
-        found: set[str] = set()
-        waiting = list(edges[start])
-        while waiting:
-            name = waiting.pop()
-            if name not in found:
-                found.add(name)
-                waiting += edges[name]
-        reached[start] = frozenset(found)
-    return reached
+def _ends(node: syntax.Selection) -> tuple[syntax.Name, ...]:
+    """The names that the terms of a Selection's productions end with."""
+    lasts = [term.items[-1] for term in terms_of(node) if term is not node.entry and term.items]
+    targets = [last.name if isinstance(last, syntax.Call) else last for last in lasts]
+    return tuple(target for target in targets if isinstance(target, syntax.Name))
 
 
 def _block_in_rule(item: syntax.Block) -> tuple[str, str]:

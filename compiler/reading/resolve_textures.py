@@ -94,9 +94,9 @@ class Textures:
 
     def declared(self, entry: Entry, span: Span):
         """The Look, Pigment, finish or colour map that ``entry`` declares, made once. Raises Problem."""
-        return entry.once(
-            lambda: self._declared(entry), span, f"'{entry.definition.name}' is declared through itself"
-        )
+        node: syntax.Texture | syntax.Declare = entry.node  # type: ignore[assignment]
+        make = lambda: self.names.known(node, lambda: self._declared(entry))  # noqa: E731
+        return entry.once(make, span, f"'{entry.definition.name}' is declared through itself")
 
     def _declared(self, entry: Entry):
         node = entry.node

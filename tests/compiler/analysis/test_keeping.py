@@ -1,0 +1,143 @@
+"""What is kept of a large part from one check to the next: messages after edits are those of a fresh start."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from plsys.compiler.analysis import Project, check_whole, keeping
+from plsys.compiler.analysis.checking import Work
+from plsys.compiler.analysis.facts import facts_of
+from plsys.compiler.analysis.whole import Result, Snapshot
+from plsys.compiler.reading.resolve_rules import Rules
+
+HEAD = """\
+camera { location <0, -14, 5> sky <0, 0, 1> look_at <0, 0, 5> }
+light_source { <20, -30, 40> color rgb 1 }
+#declare Redness = 0.5;
+#declare Twice = 2*Redness;
+Parameter order = 3 [0 to 9] "Age";
+Transformation T_up { trans 0 0 1; }
+Calculation C_all { all = order; }
+object { Forest }
+"""
+PLANT = """\
+#declare Bark{i} = texture {{ pigment {{ color rgb <Redness, 0.3, 0.1> }} }}
+Texture Leaf{i} {{ pigment {{ color rgb <Twice, n{i}/10, 0> }} }}
+Selection Tree{i}
+{{
+    C_init{i} Tree{i};
+    if (n{i} > 0) Tree{i} -> Bark{i} cylinder + C_less{i} T_up Tree{i};
+    else Tree{i} -> Leaf{i} sphere + Twig{i}(n{i} + all);
+}}
+Selection Twig{i}(w{i}) {{ Twig{i} -> 1: [ scale w{i} ] disc | Twice: T_turn{i} box; }}
+Calculation C_init{i} {{ n{i} = order; }}
+Calculation C_less{i} {{ --n{i}; }}
+Transformation T_turn{i} {{ rotz n{i}; }}
+"""
+FOREST = "Selection Forest { C_all Forest; Forest -> Tree0 + T_up Tree1 + Tree2; }\n"
+SCENE = HEAD + "".join(PLANT.format(i=i) for i in range(3)) + FOREST
+
+# Pieces of text that stand for each other, wherever they are found.
+EXCHANGES = [
+    ("Tree0", "Tree1"), ("Tree1 + Tree2", "Twig2(4) + Tree2"), ("--n1;", "++n1;"), ("--n2;", "--n2; unread = n1;"), ("n0 = order", "n0 = 3.5"),
+    ("n1 > 0", "n1 > 9"), ("n2 > 0", "2 > 1"), ("trans 0 0 1", "scale 0 1 1"), ("trans 0 0 1", "trans 0 0 n0"),
+    ("Redness = 0.5", "Redness = 0"), ("2*Redness", "1/Redness"), ("Twice:", "0:"), ("C_init1 Tree1;", "C_init1 C_all Tree1;"),
+    ("C_init2 Tree2;", "[ n2 = 2 ] Tree2;"), ("C_init0 Tree0;", ""), ("Twig1(w1) {", "Twig1 {"), ("Twig2(w2) {", "Twig2(v2) {"), ("disc", "sphere"),
+    ("C_all Forest;", ""), ("all = order", "al = order"), ("rotz n1", "rotz n2"), ("rotz n0", "rotz pi/2"), ("scale w0", "scale all"),
+    ("Texture Leaf1", "Texture Leaf2"), ("Calculation C_less0", "Transformation C_less0"), ("object { Forest }", "object { Tree1 }"),
+    ("object { Forest }", "object { Forest texture { Bark0 } }"), ("light_source", "// light_source"), ("1 }\n#dec", "1 }\nglobal_settings { seed 4 }\n#dec"),
+    ("<0, -14, 5>", "<0, 0, 0.5>"), ("T_up Tree1 +", "Forest +"), ("Parameter order", "Parameter older"), ("{ --n", "{ --n0; --n"),
+    ("cylinder", "mesh(\"no.obj\")"), ("else Tree2 ->", "Tree2 ->"), ("T_up { ", "T_up { // plain\n"), ("\nSelection Twig0", "\nSelection Tree0"),
+]  # fmt: skip
+
+
+# What is said only where all names are known.
+UNSURE = ("unused", "unreachable")
+
+
+def exchanged(choices: random.Random, text: str) -> tuple[int, str, str]:
+    """Where what is to be replaced by what."""
+    while True:
+        pair = choices.choice(EXCHANGES)
+        old, new = pair if choices.random() < 0.5 else pair[::-1]
+        places = [at for at in range(len(text)) if old and text.startswith(old, at)]
+        if places:
+            return choices.choice(places), old, new
+
+
+def told(scene, document) -> list[tuple]:
+    scene.work()
+    found = [(m.diagnostic.severity, m.diagnostic.code, m.start, m.end, m.diagnostic.message, m.diagnostic.hint) for m in scene.messages(document)]
+    return sorted(found)
+
+
+def fresh(text: str) -> list[tuple]:
+    project = Project()
+    document = project.open(None, text.encode(), name="x")
+    scene = project.scene_of(document)
+    check_whole(scene)
+    return told(scene, document)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_what_is_kept_says_what_a_fresh_start_says(seed, monkeypatch):
+    monkeypatch.setattr(keeping, "MANY_BLOCKS", 1)
+    choices, text = random.Random(seed), SCENE
+    project, work, before = Project(), Work(), None
+    document = project.open(None, text.encode(), name="x")
+    scene = project.scene_of(document)
+    for number in range(12):
+        for _ in range(choices.choice((0, 1, 1, 1, 2))):
+            at, old, new = exchanged(choices, text)
+            text = text[:at] + new + text[at + len(old) :]
+            project.edit(document, at, at + len(old), new.encode())
+        scene.work()
+        before = snapshot = Snapshot.of(scene, number, before)
+        work.take(snapshot.request)
+        if choices.random() < 0.2:
+            continue  # the next edit came first
+        work.go_on(lambda answer: Result(snapshot, answer).apply())
+        if not any(facts_of(block).is_broken for block in document.text.blocks):  # what was there before it broke is remembered
+            found, expected = told(scene, document), fresh(text)
+            if any(severity == "error" for severity, *_ in expected):
+                found, expected = ([each for each in every if each[1] not in UNSURE] for every in (found, expected))
+            assert found == expected
+
+
+@pytest.mark.parametrize("scene, old, new, code", [
+    # The entry action that others run; what they run, since a rule leads back to them; a constant through a constant.
+    (SCENE, "n0 = order", "n0 = pi/3", "radians"),
+    (SCENE, "Twig1(n1 + all)", "Forest", "maybe-unassigned"),
+    (SCENE.replace("T_turn0 {", "T_turn0 { scale Twice;"), "Redness = 0.5", "Redness = 0", "singular"),
+], ids=["entry action", "way back", "constant"])  # fmt: skip
+def test_an_edit_is_seen_far_away(scene, old, new, code, monkeypatch):
+    monkeypatch.setattr(keeping, "MANY_BLOCKS", 1)
+    project, work, before = Project(), Work(), None
+    document = project.open(None, scene.encode(), name="x")
+    shown = project.scene_of(document)
+    for this, that in (("", ""), (old, new), (new, old)):
+        at = document.text.data.index(this.encode())
+        project.edit(document, at, at + len(this), that.encode())
+        shown.work()
+        before = snapshot = Snapshot.of(shown, 0, before)
+        work.run(snapshot.request, lambda answer: Result(snapshot, answer).apply())
+        found = told(shown, document)
+        assert found == fresh(document.text.data.decode())
+        assert (code in {each[1] for each in found}) is (that == new != "")
+
+
+def test_an_edit_in_a_rule_resolves_that_rule_only(monkeypatch):
+    monkeypatch.setattr(keeping, "MANY_BLOCKS", 1)
+    project, work = Project(), Work()
+    document = project.open(None, SCENE.encode(), name="x")
+    scene = project.scene_of(document)
+    first = Snapshot.of(scene, 0)
+    work.run(first.request, lambda answer: None)
+    resolved: list[str] = []
+    selection = Rules._selection
+    monkeypatch.setattr(Rules, "_selection", lambda self, node, *rest: resolved.append(node.name.name) or selection(self, node, *rest))
+    at = SCENE.index("n1 > 0") + 5
+    project.edit(document, at, at + 1, b"1")
+    work.run(Snapshot.of(scene, 1, first).request, lambda answer: None)
+    assert resolved == ["Tree1"]
