@@ -42,7 +42,7 @@ class Namespace:
         self.writers: dict[str, dict[Block, list[syntax.Name]]] = {}
         self.users: dict[str, dict[Block, None]] = {}
         self.entries: dict[str, Entry] = {}
-        self._unfinished: dict[str, dict[Block, None]] = {}
+        self._unfinished: dict[str, dict[Block, None]] = {}  # Calculations that are being typed
         self._position = position
         self._signatures: dict[str, object] = {}
         self._touched: dict[str, None] = {}  # names that may mean something else since the last refresh
@@ -129,7 +129,7 @@ class Namespace:
         if node is None:
             return self._signatures.pop(name, None) is not None
         several = sum(map(len, self.definers.get(name, {}).values())) > 1
-        signature = (_signature(node, kind), id(node) if several else 0, self.is_unfinished(name))
+        signature = (_signature(node, kind), id(node) if several else 0, name in self._unfinished)
         if self._signatures.get(name) == signature:
             return False
         self._signatures[name] = signature
@@ -147,13 +147,9 @@ class Namespace:
         writers = self.writers.get(name)
         return (next(iter(writers.values()))[0], "parameter") if writers else (None, "")
 
-    @property
-    def has_unfinished(self) -> bool:
-        return bool(self._unfinished)
-
-    def is_unfinished(self, name: str) -> bool:
-        """Whether ``name`` is a Calculation that is being typed: what it assigns isn't known yet."""
-        return name in self._unfinished
+    def users_of_unfinished(self) -> set[Block]:
+        """The blocks that use a Calculation which is being typed: what it assigns isn't known yet."""
+        return {block for name in self._unfinished for block in self.users.get(name, ())}
 
     def renew(self, definition: Definition) -> Entry | None:
         """Forget the value of the entry that ``definition`` makes; the entry, if it makes one."""

@@ -278,12 +278,12 @@ class Scene:
         """All messages about ``document``, in text order."""
         order, found = document.text.order, []
         tables = (self._syntax, self._include_messages, self._messages, self.whole, self.general)
-        noisy = {block for table in tables for block in table}
+        noisy, unfinished = {block for table in tables for block in table}, self._names.users_of_unfinished()
         for index, block in sorted((order[block], block) for block in noisy if block in order):
             base = document.text.start_at(index)
             for table in tables:
                 said = table.get(block, ())
-                if table is self._messages and self._is_unfinished(block):
+                if table is self._messages and block in unfinished:
                     said = [each for each in said if each.code != "unknown-name"]
                 found += [Message(d, base + d.span.start, base + d.span.end) for d in said]
         # Resolving by block and the whole-file checks both look for missing files.
@@ -292,10 +292,6 @@ class Scene:
         ignored = self._ignores(document)
         kept = [m for m in found if not is_ignored(m.diagnostic.code, m.diagnostic.severity, m.start, ignored)]
         return sorted(kept, key=lambda message: (message.start, message.end))
-
-    def _is_unfinished(self, block: Block) -> bool:
-        """Whether names that ``block`` uses may be about to be assigned."""
-        return self._names.has_unfinished and any(self._names.is_unfinished(each.name) for each in facts_of(block).names)
 
     def _ignores(self, document: Document) -> list[Ignore]:
         """What `plsys-ignore` comments of ``document`` say. One at the end of a block may speak of the next one."""
