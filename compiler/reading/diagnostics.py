@@ -22,12 +22,13 @@ from typing import Iterable
 
 from .codes import CODES
 from .nearest import nearest as nearest
+from .records import record
 from .source import Source, Span
 
 SEVERITIES = ("error", "warning", "info")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Note:
     """A second place that explains the first: ``message`` reads well on its own."""
 
@@ -35,7 +36,7 @@ class Note:
     message: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Diagnostic:
     """``mend`` is the text that, in the place of ``span``, surely says what was meant; None where nothing is sure."""
 

@@ -13,18 +13,19 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .records import record
 from .source import Source, Span
 
 # --- expressions: over doubles ---------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Constant:
     value: float
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Read:
     """The value of a parameter on the derivation's path."""
 
@@ -32,7 +33,7 @@ class Read:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Apply:
     """``operation`` is an opcode's name in runtime/bytecode.toml (``add``, ``less``, ``sin``, ``rand``, ``hash`` …)
     or one of ``and``, ``or``, ``select`` (test, then, otherwise), which evaluate only what they need."""
@@ -48,14 +49,14 @@ Expression = Constant | Read | Apply
 # --- operators ----------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Assign:
     parameter: str
     value: Expression
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Variants:
     """``variants n;``: the random key becomes one of n."""
 
@@ -63,7 +64,7 @@ class Variants:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Calculate:
     """``name`` is '' for inline ones and symbol arguments. With ``together`` all values are evaluated before
     the first is assigned (symbol arguments)."""
@@ -74,7 +75,7 @@ class Calculate:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Step:
     """One line of a Transformation: ``operation`` is an opcode's name (trans rotx roty rotz rot scale
     scale_uniform shear matrix)."""
@@ -84,7 +85,7 @@ class Step:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Transform:
     """Steps compose like local frames: the last acts on the object first, M = step0 · step1 · …"""
 
@@ -93,7 +94,7 @@ class Transform:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class TextureValue:
     """A whole texture: ``values`` by name of the texture record in runtime/bytecode.toml (only what is set;
     ``pattern`` is a Constant with the pattern's id), ``entries`` of six expressions each
@@ -103,7 +104,7 @@ class TextureValue:
     entries: tuple[tuple[Expression, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Paint:
     """A texture operator, or a scene object's texture."""
 
@@ -112,7 +113,7 @@ class Paint:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class NoShadow:
     span: Span | None = field(default=None, compare=False)
 
@@ -123,7 +124,7 @@ Operator = Calculate | Transform | Paint | NoShadow
 # --- operands and productions -----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Enter:
     """A reference to a Selection. Arguments and entry action stand before it as Calculate operators."""
 
@@ -131,7 +132,7 @@ class Enter:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Primitive:
     """``shape`` is a shape's name in runtime/bytecode.toml; arguments in its order."""
 
@@ -140,7 +141,7 @@ class Primitive:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class MeshLeaf:
     """An index into ``Model.meshes``."""
 
@@ -148,14 +149,14 @@ class MeshLeaf:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Prefixed:
     operator: Operator
     operand: Operand
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Sum:
     """Two or more terms of a union."""
 
@@ -163,7 +164,7 @@ class Sum:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Empty:
     span: Span | None = field(default=None, compare=False)
 
@@ -171,7 +172,7 @@ class Empty:
 Operand = Enter | Primitive | MeshLeaf | Prefixed | Sum | Empty
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Produce:
     """A production's right-hand side; ``rule`` counts the scene's rules in source order from 0."""
 
@@ -180,7 +181,7 @@ class Produce:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Branch:
     test: Expression
     then: Production
@@ -188,7 +189,7 @@ class Branch:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Choose:
     cases: tuple[tuple[Expression, Produce], ...]
     span: Span | None = field(default=None, compare=False)
@@ -200,7 +201,7 @@ Production = Produce | Branch | Choose | Empty
 # --- the scene -------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Symbol:
     name: str
     production: Production
@@ -208,7 +209,7 @@ class Symbol:
     name_span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Mesh:
     """``vertices`` (n, 3) float64, ``normals`` (m, 3) float64 or (0, 3), ``triangles`` (k, 3) vertex indices,
     ``normal_triangles`` (k, 3) normal indices or (0, 3); NumPy arrays."""
@@ -220,7 +221,7 @@ class Mesh:
     normal_triangles: object
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Record:
     """Camera, light or settings: ``kind`` and ``values`` as in runtime/bytecode.toml's records; only what is set."""
 
@@ -229,7 +230,7 @@ class Record:
     span: Span | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SceneObject:
     """One placed object. ``symbol`` is the start symbol's name or ''; ``ordinal`` counts the objects that
     place it, from 0. ``body`` holds modifiers as operators, outermost first (the last modifier is outermost)."""
@@ -240,7 +241,7 @@ class SceneObject:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Input:
     """``Parameter name = default [low to high] "text";`` with the value that this compilation uses."""
 

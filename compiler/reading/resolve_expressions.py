@@ -20,6 +20,7 @@ from .evaluate import NotFinite, fold
 from .model import Apply, Constant, Expression, Read
 from .problems import Problem
 from .resolve_names import Entry, Names
+from .records import record
 from .source import Span
 
 BINARY = {
@@ -48,7 +49,7 @@ TEXTURES = Scope("a Texture", reads=True, draws=True, block=True)
 INPUTS = Scope("a Parameter's value", block=True)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Value:
     """A number (one part), a vector (two parts or more) or a colour (red, green, blue, filter, transmit)."""
 

@@ -20,6 +20,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from .records import record
+
 
 class Position(NamedTuple):
     """A place as people count it: ``line`` from 1, ``column`` in characters (code points) from 1."""
@@ -79,7 +81,7 @@ def _text(line: bytes) -> str:
     return line.decode(errors="replace").removeprefix("\ufeff")
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@record(eq=False)
 class Span:
     """The bytes ``[start, end)`` of ``source``."""
 

@@ -12,12 +12,11 @@ Example: ``Tree -> T_scaleCyl cylinder + C_Trunk Tree;`` is ::
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from .records import record
 from .source import Span
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Node:
     span: Span
 
@@ -25,23 +24,23 @@ class Node:
 # --- expressions -------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Number(Node):
     value: float
     text: str  # as written: `2`, `1.50`
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class String(Node):
     value: str  # without quotes, escapes resolved
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Name(Node):
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Call(Node):
     """``name(arguments)``: no space before the bracket."""
 
@@ -49,27 +48,27 @@ class Call(Node):
     arguments: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Vector(Node):
     """``<a, b, c>``: two to five components."""
 
     components: tuple[Expression, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Unary(Node):
     operator: str  # - + !
     operand: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Binary(Node):
     operator: str  # * / % + - < <= > >= == != && ||
     left: Expression
     right: Expression
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Conditional(Node):
     test: Expression
     then: Expression
@@ -82,7 +81,7 @@ Expression = Number | String | Name | Call | Vector | Unary | Binary | Condition
 # --- statements of Calculations and Transformations -----------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Assignment(Node):
     """``target = value``, ``target += value`` …, ``++target``/``target++`` (value None)."""
 
@@ -91,7 +90,7 @@ class Assignment(Node):
     value: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Operation(Node):
     """``trans 0 0 1.99;``, ``roty betaBr;``, ``variants 32;``: a name with arguments side by side or with commas."""
 
@@ -105,21 +104,21 @@ Statement = Assignment | Operation
 # --- productions -------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Inline(Node):
     """``[ --n; trans 0 0 1 ]``: each line is an operator."""
 
     statements: tuple[Statement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Group(Node):
     """``( a + b )``"""
 
     union: Union
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Term(Node):
     """Operators, outermost first, and last the operand: ``C_Trunk T_shiftTrunk Tree``.
 
@@ -128,14 +127,14 @@ class Term(Node):
     items: tuple[Name | Call | Inline | Group | Block, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Union(Node):
     """``term + term + …`` (left-associative: one node, terms in order; one term is a Union of one)."""
 
     terms: tuple[Term, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Alternative(Node):
     """``weight: body`` of a Rule. ``body`` None is the empty production ``A -> ;``."""
 
@@ -143,7 +142,7 @@ class Alternative(Node):
     body: Union | None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Rule(Node):
     """``target -> body;`` or ``target -> 3: x | 1: y;``"""
 
@@ -151,7 +150,7 @@ class Rule(Node):
     alternatives: tuple[Alternative, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class If(Node):
     """``if (test) then else otherwise``; ``else`` is already bound to the nearest ``if``."""
 
@@ -166,14 +165,14 @@ Production = Rule | If
 # --- scene blocks -------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class MapEntry(Node):
     """``[0.25 color rgb <1, 0, 0>]`` of a ``color_map``."""
 
     items: tuple[Item, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Block(Node):
     """``name { items }``, POV-Ray's form. Items stand flat, as written: ``location <0, 1, 2> angle 45`` is
     Name, Vector, Name, Number; grouping them into properties is the vocabulary's business."""
@@ -188,12 +187,12 @@ Item = Expression | Block | MapEntry
 # --- top level --------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Include(Node):
     path: String
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Declare(Node):
     """``#declare Name = items`` (an expression, ``color rgb …``, or a block)."""
 
@@ -201,7 +200,7 @@ class Declare(Node):
     items: tuple[Item, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ParameterDeclaration(Node):
     """``Parameter order = 10 [0 to 20] "Age";``"""
 
@@ -212,7 +211,7 @@ class ParameterDeclaration(Node):
     text: String | None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Selection(Node):
     """``Name(parameters) { entry; productions }``. ``entry`` is the term of the entry action,
     ``C_initialize Tree``: Calculations and last the Selection's own name. Where a header breaks off, not ``is_whole``,
@@ -225,19 +224,19 @@ class Selection(Node):
     is_whole: bool = True
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Calculation(Node):
     name: Name
     statements: tuple[Statement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Transformation(Node):
     name: Name
     statements: tuple[Statement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Texture(Node):
     """``Texture Name { pigment {…} finish {…} }``: a texture operator that may read parameters."""
 
@@ -250,6 +249,6 @@ Definition = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class File(Node):
     definitions: tuple[Definition, ...]
