@@ -23,8 +23,8 @@ def leads_back(scene: Scene, node: syntax.Selection) -> set[str]:
     start, found = node.name.name, set()
     waiting = [start]
     while waiting:
-        for block in scene.users.get(waiting.pop(), ()):
-            for each in facts_of(block).definitions:
+        for facts in scene.users.get(waiting.pop(), ()):
+            for each in facts.definitions:
                 is_new = isinstance(each.node, syntax.Selection) and each.name not in found
                 if is_new and produced_names(each.node) & ({start} | found):
                     found.add(each.name)

@@ -53,9 +53,9 @@ class Definition(NamedTuple):
         return self.node.name.span
 
 
-@dataclass
+@dataclass(eq=False)
 class Facts:
-    """See the module. ``text`` is what was parsed; ``definitions`` are those that
+    """See the module. They stay the same object while letters are typed into the block's names (retouch.py). ``text`` is what was parsed; ``definitions`` are those that
     name something; ``blocks`` are scene blocks; ``assigned`` are the names that get values, in text order; ``ghosts`` are
     definitions of an earlier text that this one has lost to a syntax error; ``spans`` are all places in ``file``, if
     there are no messages in ``syntax``."""
@@ -66,6 +66,11 @@ class Facts:
     spans: list[Span] = field(repr=False)
     syntax: list[Diagnostic]
     ghosts: dict[str, Definition] = field(default_factory=dict)
+
+    @property
+    def block(self) -> Block:
+        """The block that this is about now."""
+        return self.file.span.source  # type: ignore[return-value]
 
     @property
     def tree(self) -> Tree:

@@ -70,7 +70,7 @@ def insights_in(scene: Scene, document: Document, start: int, end: int) -> Itera
 
 def insights_of(scene: Scene, name: str) -> Iterator[Insight]:
     """What is known about a symbol or a parameter, wherever it stands."""
-    for block in (*scene.definers.get(name, ()), *scene.writers.get(name, ())):
-        for each in scene.insights.get(block, ()):
+    for facts in (*scene.definers.get(name, ()), *scene.writers.get(name, ())):
+        for each in scene.insights.get(facts.block, ()):
             if getattr(each.insight, "name", "") == name:
                 yield each.insight

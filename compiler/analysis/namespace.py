@@ -18,7 +18,7 @@ from ..reading import syntax, vocabulary
 from ..reading.model import Definition as ModelDefinition
 from ..reading.nearest import NameIndex, nearest_of
 from ..reading.resolve_names import Entry, vocabulary_names
-from .facts import Definition, facts_of
+from .facts import Definition, Facts
 from .text import Block
 
 # Definitions whose value others are made of: when one changes, so may what is said about those.
@@ -35,14 +35,15 @@ class _Nothing(list):
 
 
 class Namespace:
-    """``position`` tells where a definition stands, so that the first of several counts."""
+    """``position`` tells where a definition stands, so that the first of several counts. What defines, assigns and uses a
+    name are facts, which outlive their block's text (retouch.py)."""
 
     def __init__(self, position: Callable[[Block, Definition], tuple[int, ...]]) -> None:
-        self.definers: dict[str, dict[Block, list[Definition]]] = {}
-        self.writers: dict[str, dict[Block, list[syntax.Name]]] = {}
-        self.users: dict[str, dict[Block, None]] = {}
+        self.definers: dict[str, dict[Facts, list[Definition]]] = {}
+        self.writers: dict[str, dict[Facts, list[syntax.Name]]] = {}
+        self.users: dict[str, dict[Facts, None]] = {}
         self.entries: dict[str, Entry] = {}
-        self._unfinished: dict[str, dict[Block, None]] = {}  # Calculations that are being typed
+        self._unfinished: dict[str, dict[Facts, None]] = {}  # Calculations that are being typed
         self._position = position
         self._signatures: dict[str, object] = {}
         self._touched: dict[str, None] = {}  # names that may mean something else since the last refresh
@@ -50,38 +51,44 @@ class Namespace:
 
     # --- following blocks
 
-    def forget(self, block: Block) -> None:
-        facts = facts_of(block)
+    def forget(self, facts: Facts) -> None:
         for definition in (*facts.definitions, *facts.ghosts.values()):
-            self._drop(self.definers, definition.name, block)
-            self._drop(self._unfinished, definition.name, block)
+            self._drop(self.definers, definition.name, facts)
+            self._drop(self._unfinished, definition.name, facts)
             self._touched[definition.name] = None
         for name in facts.assigned:
-            self._drop(self.writers, name.name, block)
+            self._drop(self.writers, name.name, facts)
             self._touched[name.name] = None
         for name in facts.names:
-            self._drop(self.users, name.name, block)
+            self._drop(self.users, name.name, facts)
 
     @staticmethod
-    def _drop(table: dict[str, dict], name: str, block: Block) -> None:
-        blocks = table.get(name)
-        if blocks is not None:
-            blocks.pop(block, None)
-            if not blocks:
+    def _drop(table: dict[str, dict], name: str, facts: Facts) -> None:
+        several = table.get(name)
+        if several is not None:
+            several.pop(facts, None)
+            if not several:
                 del table[name]
 
-    def learn(self, block: Block) -> None:
-        facts = facts_of(block)
+    def learn(self, facts: Facts) -> None:
         for definition in (*facts.definitions, *facts.ghosts.values()):
-            self.definers.setdefault(definition.name, {}).setdefault(block, []).append(definition)
+            self.definers.setdefault(definition.name, {}).setdefault(facts, []).append(definition)
             if definition.kind == "calculation" and facts.is_broken:
-                self._unfinished.setdefault(definition.name, {})[block] = None
+                self._unfinished.setdefault(definition.name, {})[facts] = None
             self._touched[definition.name] = None
         for name in facts.assigned:
-            self.writers.setdefault(name.name, {}).setdefault(block, []).append(name)
+            self.writers.setdefault(name.name, {}).setdefault(facts, []).append(name)
             self._touched[name.name] = None
         for name in facts.names:
-            self.users.setdefault(name.name, {})[block] = None
+            self.users.setdefault(name.name, {})[facts] = None
+
+    def learn_use(self, facts: Facts, before: str, after: str) -> None:
+        """Where ``facts`` read one name they read another now; ``before`` they may read elsewhere, too."""
+        if all(name.name != before for name in facts.names):
+            self._drop(self.users, before, facts)
+        self.users.setdefault(after, {})[facts] = None
+        for definition in facts.definitions:
+            self._touched[definition.name] = None
 
     @property
     def is_fresh(self) -> bool:
@@ -100,9 +107,9 @@ class Namespace:
         self._touched = {}  # what once was large takes long to find the first of
         seen = set(queue)
         while queue:
-            for block in list(self.users.get(queue.pop(), ())):
-                yield block
-                for definition in facts_of(block).definitions:
+            for facts in list(self.users.get(queue.pop(), ())):
+                yield facts.block
+                for definition in facts.definitions:
                     entry = self.renew(definition)
                     if entry is not None and entry.kind in _VALUES and definition.name not in seen:
                         seen.add(definition.name)
@@ -139,17 +146,17 @@ class Namespace:
         """The syntax of what defines ``name`` (the first, as the compiler sees it), and its kind."""
         if vocabulary.kind_of(name):
             return None, ""
-        found = [(block, each) for block, several in self.definers.get(name, {}).items() for each in several]
+        found = [(facts, each) for facts, several in self.definers.get(name, {}).items() for each in several]
         if found:
             if len(found) > 1:
-                found.sort(key=lambda pair: (pair[1].name in facts_of(pair[0]).ghosts, *self._position(*pair)))
+                found.sort(key=lambda pair: (name in pair[0].ghosts, *self._position(pair[0].block, pair[1])))
             return found[0][1].node, found[0][1].kind
         writers = self.writers.get(name)
         return (next(iter(writers.values()))[0], "parameter") if writers else (None, "")
 
     def users_of_unfinished(self) -> set[Block]:
         """The blocks that use a Calculation which is being typed: what it assigns isn't known yet."""
-        return {block for name in self._unfinished for block in self.users.get(name, ())}
+        return {facts.block for name in self._unfinished for facts in self.users.get(name, ())}
 
     def renew(self, definition: Definition) -> Entry | None:
         """Forget the value of the entry that ``definition`` makes; the entry, if it makes one."""

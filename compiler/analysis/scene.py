@@ -137,12 +137,14 @@ class Scene:
                 keep_lost(change)
             for block in change.removed:
                 self._forget(block)
+                self._names.forget(facts_of(block))
                 removed_includes |= b"include" in block.data and bool(facts_of(block).includes)
                 drop_facts(block)
                 yield
             waiting = self._opened if len(change.added) >= MANY_BLOCKS else self._edited
             for block in change.added:
                 self._learn(block)
+                self._names.learn(facts_of(block))
                 waiting[block] = None
                 yield
             if removed_includes or any(facts_of(block).includes for block in change.added if b"include" in block.data):
@@ -163,8 +165,16 @@ class Scene:
         if touch is None:
             return False
         was_right = not any(old in table for table in (self._messages, self._edited, self._dirty, self._opened))
+        facts, name = facts_of(old), facts_of(old).names[touch.index]
+        reads = name.role in ("read", "target")
         self._forget(old)
+        if not reads:
+            self._names.forget(facts)
         place = retouch(old, new, touch)
+        if reads:
+            self._names.learn_use(facts, name.name, touch.text)
+        else:
+            self._names.learn(facts)
         self._learn(new)
         self._edited[new] = place if was_right else None
         return True
@@ -173,7 +183,6 @@ class Scene:
         waiting = self._edited, self._dirty, self._opened
         for table in (self._messages, self._syntax, self.whole, self.general, self.insights, self._ignoring, *waiting):
             table.pop(block, None)
-        self._names.forget(block)
         for single in self.singles.values():
             single.pop(block, None)
 
@@ -183,7 +192,6 @@ class Scene:
             self._syntax[block] = facts.syntax
         if IGNORE_WORD in block.data:
             self._ignoring[block] = None
-        self._names.learn(block)
         role_of(block)  # the whole-file checks ask for it, of all blocks at once
         for each in facts.blocks:
             if each.name.name in self.singles:
@@ -340,12 +348,12 @@ class Scene:
     def uses(self, name: str) -> list[Place]:
         """Every occurrence of the scene's own ``name``, with its role, in all files, in reading order."""
         places = []
-        for block in self.users.get(name, ()):
-            document = self.document_of(block)
+        for facts in self.users.get(name, ()):
+            document = self.document_of(facts.block)
             if document is None:
                 continue
-            base = document.text.start_of(block)
-            for each in facts_of(block).names:
+            base = document.text.start_of(facts.block)
+            for each in facts.names:
                 if each.name == name:
                     places.append(Place(document, base + each.start, base + each.end, each.role))
         return sorted(places, key=self._reading_order)
