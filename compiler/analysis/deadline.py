@@ -30,11 +30,11 @@ class Deadline:
 
     def has_passed(self) -> bool:
         """To be asked after each step, of a fraction of a millisecond."""
-        if self._is_urgent():
-            return True
         self._steps += 1
         if self._steps % STEPS:
             return False
+        if self._is_urgent():
+            return True
         now = time.perf_counter()
         if now < self._earliest:
             return False

@@ -10,13 +10,13 @@ Example: the facts of ``Selection A { A -> C_step A; }`` are one definition (``A
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Iterator, NamedTuple
 
 from ..reading import mistakes, syntax, vocabulary
 from ..reading.diagnostics import Diagnostic, Diagnostics
 from ..reading.grammar import syntax_tree
 from ..reading.parse import convert
+from ..reading.records import lazy_property
 from ..reading.resolve_names import assigned_names, kind_of_definition
 from ..reading.source import Span
 from .text import Block, Change
@@ -82,7 +82,7 @@ class Facts:
         """The text has changed, and with it all else but the tree."""
         self.text, self._tree = self.file.span.source.data, None
 
-    @cached_property
+    @lazy_property
     def definitions(self) -> list[Definition]:
         found = []
         for node in self.file.definitions:
@@ -90,19 +90,19 @@ class Facts:
                 found.append(Definition(node.name.name, kind_of_definition(node), node))
         return found
 
-    @cached_property
+    @lazy_property
     def blocks(self) -> list[syntax.Block]:
         return [node for node in self.file.definitions if isinstance(node, syntax.Block)]
 
-    @cached_property
+    @lazy_property
     def includes(self) -> list[syntax.Include]:
         return [node for node in self.file.definitions if isinstance(node, syntax.Include)]
 
-    @cached_property
+    @lazy_property
     def assigned(self) -> list[syntax.Name]:
         return [name for node in self.file.definitions for name in assigned_names(node) if name.name]
 
-    @cached_property
+    @lazy_property
     def names(self) -> list[Name]:
         """All occurrences of names that may be the scene's own, in text order."""
         found = [name for node in self.file.definitions for name in _names_of(node)]
@@ -110,7 +110,7 @@ class Facts:
             {(name.start, name.end): name for name in found if name.name}.values(), key=lambda n: n.start
         )
 
-    @cached_property
+    @lazy_property
     def is_broken(self) -> bool:
         return any(item.severity == "error" for item in self.syntax)
 

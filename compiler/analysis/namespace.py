@@ -88,7 +88,8 @@ class Namespace:
             self._drop(self.users, before, facts)
         self.users.setdefault(after, {})[facts] = None
         for definition in facts.definitions:
-            self._touched[definition.name] = None
+            if definition.kind in _VALUES:
+                self._touched[definition.name] = None
 
     @property
     def is_fresh(self) -> bool:
@@ -135,7 +136,8 @@ class Namespace:
             entry.value, entry.failed = None, False  # the same syntax may say something else: see retouch.py
         if node is None:
             return self._signatures.pop(name, None) is not None
-        several = sum(map(len, self.definers.get(name, {}).values())) > 1
+        definers = self.definers.get(name, {})
+        several = len(definers) > 1 or any(len(each) > 1 for each in definers.values())
         signature = (_signature(node, kind), id(node) if several else 0, name in self._unfinished)
         if self._signatures.get(name) == signature:
             return False

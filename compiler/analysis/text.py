@@ -16,18 +16,20 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from ..reading.records import lazy_property
 from ..reading.source import Source
 from .split import Piece, Shape, group, is_hard, split
 from .sums import Sums
 
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 
-# Bytes that begin and end no comment, string, block, definition or line.
+# Bytes that begin and end no comment, string, block, definition or line; and such with one more at each side which they make
+# nothing else of.
 _PLAIN = re.compile(rb"[\w ().,:<>=+|-]*")
+_AMID_PLAIN = re.compile(rb"[\w ().,:<>=+|{};-][\w ().,:<>=+|-]*[\w ().,:<>=+|{};\r\n-]")
 
 # A line on which another piece might begin: see split.py.
 _HEAD_LINE = re.compile(rb"[\r\n][A-Za-z_#]")
@@ -47,7 +49,7 @@ class Block(Source):
     before: tuple[Block, tuple[int, int, int]] | None
     after: Block | None  # the block that replaced this one
 
-    @cached_property
+    @lazy_property
     def line_starts(self) -> list[int]:
         """Byte offset of each line's first byte in this block."""
         return [0, *(match.end() for match in _LINE_END.finditer(self.data))]
@@ -56,7 +58,7 @@ class Block(Source):
     def line_ends(self) -> int:
         return len(self.line_starts) - 1
 
-    @cached_property
+    @lazy_property
     def has_head_lines(self) -> bool:
         """Whether another piece might begin on one of the lines after the first."""
         return _HEAD_LINE.search(self.data) is not None
@@ -180,7 +182,7 @@ class Text:
         index = self.index_at(start)
         block, base = self.blocks[index], self._starts[index]
         old, low, high, shape = block.data, start - base, end - base, block.shape
-        if shape.depth or shape.comment or not low or not _PLAIN.fullmatch(data) or not _PLAIN.fullmatch(old, low - 1, high + 1):
+        if shape.depth or shape.comment or not low or not _PLAIN.fullmatch(data) or not _AMID_PLAIN.fullmatch(old, low - 1, high + 1):
             return None
         # Whether the next block starts where it does is seen at the end of this one.
         ends = len(old.rstrip())

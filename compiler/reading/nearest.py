@@ -48,6 +48,8 @@ def nearest_of(name: str, indexes: Sequence[NameIndex]) -> str:
     if sum(len(index.heads) for index in indexes) < MANY_NAMES:
         return _hint(name, [other for index in indexes for other in index.heads])
     found = set(_neighbours(name, [index.heads for index in indexes]))
+    if (slip := _a_letter_off(name, found)) is not None:
+        return f"did you mean '{slip}'?"
     found.update(other[::-1] for other in _neighbours(name[::-1], [index.tails for index in indexes]))
     if (slip := _a_letter_off(name, found)) is not None:
         return f"did you mean '{slip}'?"
