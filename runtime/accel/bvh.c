@@ -72,7 +72,7 @@ bool pl_bvh_chain(pl_bvh_work *w, const pl_front *front, uint32_t opened, size_t
 {
     const pl_item *items = w->states->items;
     size_t length = 0;
-    for (uint32_t at = front->opened[opened].moved; at; at = front->opened[front->opened[at].parent].moved) {
+    for (uint32_t at = opened; at; at = front->opened[at].above) {
         if (length >= w->chain_capacity && !grow(&w->chain, length + 1, &w->chain_capacity, sizeof *w->chain, error))
             return false;
         w->chain[length++] = &items[front->opened[at].item];

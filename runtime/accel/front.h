@@ -47,7 +47,7 @@ typedef struct pl_front_node {
 /* A state that stands opened in a front, reached by `item` (of pl_states.items). Node 0 is the front's own state. */
 typedef struct pl_opened {
     uint32_t item, parent;
-    uint32_t moved; /* the nearest node from this one up whose item has transformations, or 0 */
+    uint32_t above; /* the nearest node above this one whose item has transformations, or 0 */
 } pl_opened;
 
 typedef struct pl_front_primitive {

@@ -309,8 +309,13 @@ static bool open_state(opening *o, const place *from)
     const uint32_t state = from->item ? from->item->what : o->front->state, opened = (uint32_t)o->opened++;
     const pl_state *it = &states->list[state];
     pl_opened *list = o->items->opened;
-    const uint32_t moved = !from->item ? 0 : from->item->transform_count ? opened : list[from->parent].moved;
-    list[opened] = (pl_opened){from->item ? number_of(states, from->item) : 0, from->parent, moved};
+    const uint32_t parent = from->parent;
+    if (from->item) {
+        const bool moved = parent && pl_front_item(states, list[parent].item)->transform_count;
+        list[opened] = (pl_opened){number_of(states, from->item), parent, moved ? parent : list[parent].above};
+    } else {
+        list[opened] = (pl_opened){0};
+    }
     for (uint32_t i = it->item_count; i-- > 0;) {
         const pl_item *item = &it->items[i];
         const size_t composition = made->first[state] + i;
