@@ -1,6 +1,7 @@
 /* bvh.c - the default accelerator: fronts (front.h), filtered in single precision by a kernel, evaluated in double here. */
 #include "bvh.h"
 
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -68,14 +69,28 @@ bool pl_bvh_grow_packet_stack(pl_bvh_work *w, size_t top, pl_error *error)
 
 /* --- candidates --- */
 
-bool pl_bvh_chain(pl_bvh_work *w, const pl_front *front, uint32_t opened, size_t *count, pl_error *error)
+/* Adds an item's transformations, the last one first. Most items have none, one or two, and which it is can't be foretold: two
+ * are read in any case, from the block of packed states, in which items stand before all lists. */
+static inline size_t add_transforms(const pl_transform **chain, size_t length, const pl_item *item)
 {
-    const pl_item *items = w->states->items;
+    const size_t count = item->transform_count;
+    const pl_transform *const *end = item->transforms + count;
+    chain[length] = end[-1];
+    chain[length + 1] = end[-2];
+    if (__builtin_expect(count > 2, 0))
+        for (size_t i = 2; i < count; i++) chain[length + i] = end[-1 - (ptrdiff_t)i];
+    return length + count;
+}
+
+bool pl_bvh_chain(pl_bvh_work *w, const pl_front *front, uint32_t opened, const pl_item *item, size_t *count, pl_error *error)
+{
     size_t length = 0;
-    for (uint32_t at = opened; at; at = front->opened[at].above) {
-        if (length >= w->chain_capacity && !grow(&w->chain, length + 1, &w->chain_capacity, sizeof *w->chain, error))
-            return false;
-        w->chain[length++] = &items[front->opened[at].item];
+    for (uint32_t at = opened;; at = front->opened[at].above) {
+        const size_t most = length + item->transform_count + 2;
+        if (most > w->chain_capacity && !grow(&w->chain, most, &w->chain_capacity, sizeof *w->chain, error)) return false;
+        length = add_transforms(w->chain, length, item);
+        if (!at) break;
+        item = &w->states->items[front->opened[at].item];
     }
     *count = length;
     return true;

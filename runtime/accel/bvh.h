@@ -57,7 +57,7 @@ typedef struct pl_bvh_lane {
 typedef struct pl_bvh_work {
     const pl_states *states;
     pl_bvh_lane lanes[PL_LANES]; /* the first one for single rays, the others from when they are needed */
-    const pl_item **chain;
+    const pl_transform **chain;
     size_t chain_capacity;
     pl_packet_frame *packets;
     uint64_t *packet_stack;
@@ -89,8 +89,8 @@ pl_leaf pl_bvh_leaf(const pl_scene *scene, const pl_item *item, const pl_bvh_pla
 bool pl_bvh_offer(pl_tracer *tracer, const pl_bvh_lane *lane, uint32_t frame, pl_ref ref, const pl_item *item,
                   const double o[3], const double d[3], pl_query *query);
 
-/* The items with transformations on the way to an opened node, into work->chain, the last one first. */
-bool pl_bvh_chain(pl_bvh_work *work, const pl_front *front, uint32_t opened, size_t *count, pl_error *error);
+/* The transformations on the way from a front's state to an item of an opened node, into work->chain, the last one first. */
+bool pl_bvh_chain(pl_bvh_work *work, const pl_front *front, uint32_t opened, const pl_item *item, size_t *count, pl_error *error);
 
 /* Room for one more frame, for eight more entries above `top`; false: no memory. */
 bool pl_bvh_grow_frames(pl_bvh_lane *lane, size_t count, pl_error *error);

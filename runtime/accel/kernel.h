@@ -274,12 +274,9 @@ static inline __attribute__((always_inline)) bool map_down(pl_bvh_work *w, const
                                                            const pl_item *item, double4 *o, double4 *d, pl_error *error)
 {
     size_t count;
-    if (!pl_bvh_chain(w, front, opened, &count, error)) return false;
-    for (;;) {
-        const pl_item *at = count ? w->chain[count - 1] : item;
-        for (uint32_t i = 0; i < at->transform_count; i++) map_step(at->transforms[i], o, d);
-        if (!count--) return true;
-    }
+    if (!pl_bvh_chain(w, front, opened, item, &count, error)) return false;
+    while (count > 0) map_step(w->chain[--count], o, d);
+    return true;
 }
 
 /* Evaluates a primitive of a frame normatively and offers it. The normative ray comes from the deepest frame above that knows

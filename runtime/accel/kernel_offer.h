@@ -38,39 +38,35 @@ static inline void store_quad(pl_lanes *rays, int first, const quad *q)
     }
 }
 
-/* pl_map_ray, through an item's transformations. */
-static inline void map_quad(const pl_item *item, quad *q)
+/* pl_map_ray */
+static inline void map_quad(const pl_transform *transform, quad *q)
 {
-    for (uint32_t i = 0; i < item->transform_count; i++) {
-        const pl_transform *transform = item->transforms[i];
-        const double *m = transform->to_object.m;
-        if (transform->form == PL_FORM_GENERAL) {
-            const quad from = *q;
+    const double *m = transform->to_object.m;
+    if (transform->form == PL_FORM_GENERAL) {
+        const quad from = *q;
 #pragma GCC unroll 3
-            for (int r = 0; r < 3; r++) {
-                const four a = four_set(m[4 * r]), b = four_set(m[4 * r + 1]), c = four_set(m[4 * r + 2]);
-                q->o[r] = a * from.o[0] + b * from.o[1] + c * from.o[2] + four_set(m[4 * r + 3]);
-                q->d[r] = a * from.d[0] + b * from.d[1] + c * from.d[2];
-            }
-            continue;
+        for (int r = 0; r < 3; r++) {
+            const four a = four_set(m[4 * r]), b = four_set(m[4 * r + 1]), c = four_set(m[4 * r + 2]);
+            q->o[r] = a * from.o[0] + b * from.o[1] + c * from.o[2] + four_set(m[4 * r + 3]);
+            q->d[r] = a * from.d[0] + b * from.d[1] + c * from.d[2];
         }
+        return;
+    }
 #pragma GCC unroll 3
-        for (int axis = 0; axis < 3; axis++) {
-            if (transform->form == PL_FORM_DIAGONAL) {
-                q->o[axis] *= four_set(m[5 * axis]);
-                q->d[axis] *= four_set(m[5 * axis]);
-            }
-            q->o[axis] += four_set(m[4 * axis + 3]);
+    for (int axis = 0; axis < 3; axis++) {
+        if (transform->form == PL_FORM_DIAGONAL) {
+            q->o[axis] *= four_set(m[5 * axis]);
+            q->d[axis] *= four_set(m[5 * axis]);
         }
+        q->o[axis] += four_set(m[4 * axis + 3]);
     }
 }
 
-/* Four normative rays of a frame, mapped through the items of the chain and one more. */
-static inline quad quad_below(const pl_bvh_work *w, size_t count, const pl_item *item, const pl_lanes *rays, int first)
+/* Four normative rays of a frame, mapped through the chain. */
+static inline quad quad_below(const pl_bvh_work *w, size_t count, const pl_lanes *rays, int first)
 {
     quad q = load_quad(rays, first);
     while (count > 0) map_quad(w->chain[--count], &q);
-    map_quad(item, &q);
     return q;
 }
 
@@ -85,11 +81,11 @@ static bool map_packet(const pl_scene *scene, pl_bvh_work *w, uint32_t index, un
         const pl_front_place *it = &parent->front->places[f->instance];
         const pl_item *item = pl_front_item(&scene->states, it->item);
         size_t count;
-        if (!pl_bvh_chain(w, parent->front, it->opened, &count, error)) return false;
+        if (!pl_bvh_chain(w, parent->front, it->opened, item, &count, error)) return false;
         /* Quads that were mapped before are mapped again to the same numbers. */
         for (unsigned rest = quads; rest; rest &= rest - 1) {
             const int first = 4 * __builtin_ctz(rest);
-            const quad q = quad_below(w, count, item, &parent->normative, first);
+            const quad q = quad_below(w, count, &parent->normative, first);
             store_quad(&f->normative, first, &q);
         }
         f->mapped |= quads;
@@ -109,11 +105,11 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     size_t count;
     for (int i = 0; i < QUADS; i++) quads |= (unsigned)((lanes >> 4 * i & 15) != 0) << i;
     if (!map_packet(scene, w, index, quads, queries->error)) return false;
-    if (!pl_bvh_chain(w, f->front, p->opened, &count, queries->error)) return false;
+    if (!pl_bvh_chain(w, f->front, p->opened, item, &count, queries->error)) return false;
     pl_lanes rays;
     for (; quads; quads &= quads - 1) {
         const int first = 4 * __builtin_ctz(quads);
-        const quad q = quad_below(w, count, item, &f->normative, first);
+        const quad q = quad_below(w, count, &f->normative, first);
         store_quad(&rays, first, &q);
     }
     wide_end();
