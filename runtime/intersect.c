@@ -39,29 +39,42 @@ static bool set_ray(const job *j, size_t i, pl_ray *ray, pl_error *error)
     return true;
 }
 
-static bool describe(pl_tracer *tracer, const pl_hits *out, size_t i, const pl_ray *ray, pl_hit *hit,
-                     pl_error *error)
+/* What is told of a hit's surface. */
+static bool tell_surface(pl_tracer *tracer, const pl_hits *out, size_t i, const pl_ray *ray, pl_hit *hit, pl_error *error)
 {
-    bool found = hit->t < INFINITY;
     pl_surface surface;
     surface.symbol = surface.rule = -1;
     surface.depth = 0;
     surface.normal[0] = surface.normal[1] = surface.normal[2] = 0.0;
-    if (found && (out->symbol || out->rule || out->depth || out->normal) &&
-        !pl_trace_surface(tracer, ray, hit, &surface, error))
-        return false;
-    if (out->primitive && !pl_trace_number(tracer, hit, error)) return false;
-    if (out->t) out->t[i] = hit->t;
-    if (out->bound) out->bound[i] = hit->bound;
-    if (out->primitive) {
-        uint64_t primitive = found ? pl_trace_primitive(tracer, hit) : 0;
-        out->primitive[i] = !found ? -1 : primitive > INT64_MAX ? INT64_MAX : (int64_t)primitive;
-    }
+    if (hit->t < INFINITY && !pl_trace_surface(tracer, ray, hit, &surface, error)) return false;
     if (out->symbol) out->symbol[i] = surface.symbol;
     if (out->rule) out->rule[i] = surface.rule;
     if (out->depth) out->depth[i] = surface.depth;
     for (size_t axis = 0; out->normal && axis < 3; axis++) out->normal[3 * i + axis] = surface.normal[axis];
     return true;
+}
+
+static bool tell_primitive(pl_tracer *tracer, const pl_hits *out, size_t i, pl_hit *hit, pl_error *error)
+{
+    const bool found = hit->t < INFINITY;
+    if (!pl_trace_number(tracer, hit, error)) return false;
+    const uint64_t primitive = found ? pl_trace_primitive(tracer, hit) : 0;
+    out->primitive[i] = !found ? -1 : primitive > INT64_MAX ? INT64_MAX : (int64_t)primitive;
+    return true;
+}
+
+/* Writes what is asked of some hits; returns how many were done before an error. */
+static unsigned tell(pl_tracer *tracer, const pl_hits *out, size_t first, unsigned count, const pl_ray *rays, pl_hit *hits,
+                     pl_error *error)
+{
+    const bool surface = out->symbol || out->rule || out->depth || out->normal;
+    for (unsigned i = 0; out->t && i < count; i++) out->t[first + i] = hits[i].t;
+    for (unsigned i = 0; out->bound && i < count; i++) out->bound[first + i] = hits[i].bound;
+    for (unsigned i = 0; (surface || out->primitive) && i < count; i++) {
+        if (surface && !tell_surface(tracer, out, first + i, &rays[i], &hits[i], error)) return i;
+        if (out->primitive && !tell_primitive(tracer, out, first + i, &hits[i], error)) return i;
+    }
+    return count;
 }
 
 /* Traces up to PL_TRACE_MANY rays from `first` on; returns how many were done before an error. */
@@ -76,9 +89,8 @@ static unsigned trace_some(job *j, pl_tracer *tracer, size_t first, unsigned cou
         for (; done < traced; done++) j->occluded[first + done] = blocked[done];
         return done;
     }
-    unsigned traced = pl_trace_nearest_many(tracer, rays, known, hits, error);
-    while (done < traced && describe(tracer, j->hits, first + done, &rays[done], &hits[done], error)) done++;
-    return done;
+    const unsigned traced = pl_trace_nearest_many(tracer, rays, known, hits, error);
+    return tell(tracer, j->hits, first, traced, rays, hits, error);
 }
 
 static void report(job *j, size_t ray, const pl_error *error)

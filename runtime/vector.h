@@ -43,7 +43,7 @@ static inline double pl_normalize(double v[3])
 
 static inline bool pl_finite(const double v[3])
 {
-    return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
+    return (v[0] - v[0]) + (v[1] - v[1]) + (v[2] - v[2]) == 0.0; /* else NaN */
 }
 
 #endif

@@ -165,18 +165,18 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     }
 }
 
-bool pl_bvh_are_alike(const pl_ray *rays, unsigned count, double scale)
+#ifdef __x86_64__
+/* Whether another ray goes about the same way as the first one; scale: 1 / half the size of what is traced. */
+static bool is_alike(const pl_ray *first, const pl_ray *other, double scale)
 {
-    const double *first = rays->direction, near = 0.125 * (fabs(first[0]) + fabs(first[1]) + fabs(first[2]));
-    for (unsigned i = 1; i < count; i++)
-        for (int axis = 0; axis < 3; axis++) {
-            const double d = first[axis], o = rays->origin[axis];
-            if (!(d * rays[i].direction[axis] > 0.0) || !(fabs(rays[i].direction[axis] - d) < near) ||
-                !(fabs(rays[i].origin[axis] - o) * scale < 0.125))
-                return false;
-        }
-    return count >= PL_LEAST_LANES;
+    const double *d = first->direction, near = PL_ALIKE * (fabs(d[0]) + fabs(d[1]) + fabs(d[2]));
+    for (int axis = 0; axis < 3; axis++) {
+        const double along = other->direction[axis], apart = other->origin[axis] - first->origin[axis];
+        if (!(d[axis] * along > 0.0 && fabs(along - d[axis]) < near && fabs(apart) * scale < PL_ALIKE)) return false;
+    }
+    return true;
 }
+#endif
 
 static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
 {
@@ -184,9 +184,10 @@ static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries,
 #ifdef __x86_64__
     const int isa = tracer->scene->isa;
     const double scale = ((const pl_fronts *)tracer->scene->structure)->list->scale;
-    if (isa != PL_ISA_SCALAR && pl_bvh_are_alike(rays, count, scale))
-        kernel = isa == PL_ISA_AVX512 ? pl_bvh_packet_avx512 : pl_bvh_packet_avx2;
-    else if (isa != PL_ISA_SCALAR) kernel = isa == PL_ISA_AVX512 ? pl_bvh_stream_avx512 : pl_bvh_stream_avx2;
+    /* The packets' kernels look at all. */
+    const bool packet = count >= PL_LEAST_LANES && is_alike(rays, rays + 1, scale) && is_alike(rays, rays + count - 1, scale);
+    if (isa == PL_ISA_AVX512) kernel = packet ? pl_bvh_packet_avx512 : pl_bvh_stream_avx512;
+    else if (isa != PL_ISA_SCALAR) kernel = packet ? pl_bvh_packet_avx2 : pl_bvh_stream_avx2;
 #endif
     return kernel(tracer, rays, queries, count);
 }

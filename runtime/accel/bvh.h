@@ -71,9 +71,9 @@ extern pl_bvh_kernel pl_bvh_trace_scalar, pl_bvh_trace_avx2, pl_bvh_trace_avx512
 typedef bool pl_bvh_many_kernel(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
 extern pl_bvh_many_kernel pl_bvh_stream_scalar, pl_bvh_stream_avx2, pl_bvh_stream_avx512;
 extern pl_bvh_many_kernel pl_bvh_packet_avx2, pl_bvh_packet_avx512;
-/* Whether rays go well together as a packet: all directions lie about the first's, and so do the origins, as seen from the size
- * of what is traced; scale: 1 / half of it. */
-bool pl_bvh_are_alike(const pl_ray *rays, unsigned count, double scale);
+/* Rays go well together as a packet where all directions lie about the first's, by this share of its size (sums of axes), and so
+ * do the origins, by this share of half the size of what is traced. */
+#define PL_ALIKE 0.125
 
 /* Where a leaf is: frames 1 … frame of a lane, then a primitive. */
 typedef struct pl_bvh_place {

@@ -373,27 +373,58 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
     return true;
 }
 
-/* A packet's rays in a front's unit frame, from the first t that counts; lanes that are left over get the first ray. */
-static inline void load_rays(pl_packet_frame *f, const pl_front *front, const pl_ray *rays, const pl_query *queries, unsigned count,
-                             double *t_max)
+/* The rays as they came; lanes that are left over get the first one. */
+static inline void load_rays(pl_lanes *lanes, const pl_ray *rays, const pl_query *queries, unsigned count, double *t_max)
 {
-    double t0 = queries->t_min, distance = 0.0;
-    for (unsigned i = 1; i < count; i++) t0 = queries[i].t_min < t0 ? queries[i].t_min : t0;
     for (unsigned lane = 0; lane < PL_LANES; lane++) {
         const unsigned i = lane < count ? lane : 0;
-        double away = 0.0;
         t_max[lane] = queries[i].t_max;
         for (int axis = 0; axis < 3; axis++) {
-            const double o = rays[i].origin[axis], d = rays[i].direction[axis];
-            const double from = (o - front->centre[axis]) * front->scale;
-            f->normative.o[axis][lane] = o;
-            f->normative.d[axis][lane] = d;
-            f->d[axis][lane] = d * front->scale;
-            f->o[axis][lane] = from + t0 * f->d[axis][lane];
-            away += __builtin_fabs(from);
+            lanes->o[axis][lane] = rays[i].origin[axis];
+            lanes->d[axis][lane] = rays[i].direction[axis];
         }
-        distance = away > distance ? away : distance;
     }
+}
+
+static inline four four_absolute(four x)
+{
+    return _mm256_andnot_pd(four_set(-0.0), x);
+}
+
+/* Whether all rays go about the same way. */
+static inline bool are_alike(const pl_lanes *rays, const pl_front *front)
+{
+    const double near = PL_ALIKE * (__builtin_fabs(rays->d[0][0]) + __builtin_fabs(rays->d[1][0]) + __builtin_fabs(rays->d[2][0]));
+    four alike = four_set(0.0) == four_set(0.0);
+    for (int axis = 0; axis < 3; axis++) {
+        const four o = four_set(rays->o[axis][0]), d = four_set(rays->d[axis][0]);
+        for (int i = 0; i < PL_LANES; i += 4) {
+            const four along = _mm256_loadu_pd(rays->d[axis] + i), apart = _mm256_loadu_pd(rays->o[axis] + i) - o;
+            alike = _mm256_and_pd(alike, _mm256_cmp_pd(d * along, four_set(0.0), _CMP_GT_OQ));
+            alike = _mm256_and_pd(alike, _mm256_cmp_pd(four_absolute(along - d), four_set(near), _CMP_LT_OQ));
+            alike = _mm256_and_pd(alike, _mm256_cmp_pd(four_absolute(apart) * front->scale, four_set(PL_ALIKE), _CMP_LT_OQ));
+        }
+    }
+    return _mm256_movemask_pd(alike) == 15;
+}
+
+/* A packet's rays in the unit frame of the scene's front, from the first t that counts. */
+static inline void begin_packet(pl_packet_frame *f, const pl_front *front, double t0)
+{
+    four farthest = four_set(0.0);
+    for (int i = 0; i < PL_LANES; i += 4) {
+        four away = four_set(0.0);
+        for (int axis = 0; axis < 3; axis++) {
+            const four from = (_mm256_loadu_pd(f->normative.o[axis] + i) - front->centre[axis]) * front->scale;
+            const four d = _mm256_loadu_pd(f->normative.d[axis] + i) * front->scale;
+            _mm256_storeu_pd(f->d[axis] + i, d);
+            _mm256_storeu_pd(f->o[axis] + i, from + t0 * d);
+            away += four_absolute(from);
+        }
+        farthest = _mm256_max_pd(away, farthest);
+    }
+    double distance = 0.0;
+    for (int i = 0; i < 4; i++) distance = farthest[i] > distance ? farthest[i] : distance;
     f->front = front;
     f->instance = 0;
     f->error = 0.0f;
@@ -403,13 +434,27 @@ static inline void load_rays(pl_packet_frame *f, const pl_front *front, const pl
     f->mapped = (1u << QUADS) - 1;
 }
 
+/* A packet at its beginning. false: its rays go different ways. */
+static inline bool make_packet(pl_packet_frame *f, const pl_front *front, const pl_ray *rays, const pl_query *queries, unsigned count,
+                               double *t_max)
+{
+    double t0 = queries->t_min;
+    load_rays(&f->normative, rays, queries, count, t_max);
+    if (!are_alike(&f->normative, front)) return false;
+    for (unsigned i = 1; i < count; i++) t0 = queries[i].t_min < t0 ? queries[i].t_min : t0;
+    begin_packet(f, front, t0);
+    return true;
+}
+
+/* Rays that turn out to go different ways become a stream. */
 bool PACKET_KERNEL(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
 {
     pl_bvh_work *w = tracer->work;
     double t_max[PL_LANES];
     if (!pl_bvh_grow_packets(w, 0, queries->error) || !pl_bvh_grow_packet_stack(w, 0, queries->error)) return false;
-    load_rays(&w->packets[0], ((const pl_fronts *)tracer->scene->structure)->list, rays, queries, count, t_max);
-    w->lanes->frames[0].front = w->packets[0].front;
+    const pl_front *front = ((const pl_fronts *)tracer->scene->structure)->list;
+    if (!make_packet(w->packets, front, rays, queries, count, t_max)) return STREAM_KERNEL(tracer, rays, queries, count);
+    w->lanes->frames[0].front = front;
     w->lanes->frames[0].instance = 0;
     const unsigned lanes = (1u << count) - 1;
     const bool ok = queries->kind == PL_QUERY_ANY ? visit_packet(tracer, lanes, queries, t_max, true)

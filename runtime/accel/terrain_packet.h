@@ -219,8 +219,7 @@ bool TERRAIN_PACKET(pl_tracer *tracer, const pl_terrain *terrain, const pl_ray *
         return false;
     convoy c = {.terrain = terrain, .frame = w->packets, .rays = rays, .queries = queries};
     bool ok = true, beams = false;
-    if (pl_bvh_are_alike(rays, count, terrain->front.scale)) {
-        load_rays(c.frame, &terrain->front, rays, queries, count, c.t_max);
+    if (count >= PL_LEAST_LANES && make_packet(c.frame, &terrain->front, rays, queries, count, c.t_max)) {
         const enum course course = begin_lanes(c.frame, (1u << count) - 1, c.t_max);
         if (course == ASTRAY) goto end;
         beams = course == AS_BEAM && look_along(&c.beam, c.frame);
