@@ -323,10 +323,7 @@ def main() -> None:
     def send(answer: Answer) -> None:
         output.write(pickle.dumps(answer))
         output.flush()
-
-    def has_news() -> bool:
         _tidy()
-        return not requests.empty()
 
     gc.disable()
     Thread(target=read, daemon=True).start()
@@ -338,13 +335,13 @@ def main() -> None:
                 return
             work.take(request)
         try:
-            work.go_on(send, has_news)
+            work.go_on(send, lambda: not requests.empty())
         except Exception:  # a mistake of ours must not end all checks
             send(work.give_up())
 
 
 def _tidy() -> None:
-    """Search for garbage in cycles among what is new since the last part; the rest, of a large scene, is many objects that
+    """Search for garbage in cycles among what is new since the last answer; the rest, of a large scene, is many objects that
     stay and takes a quarter of a second. (What blocks and their facts say of each other, facts.drop_facts takes apart.)"""
     gc.collect(0)
     gc.freeze()

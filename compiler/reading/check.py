@@ -22,7 +22,7 @@ from .memory import Memory
 from .model import Constant, Expression, Model, Symbol
 from .resolve_names import ARTICLES
 from .source import Span
-from .view import View
+from .view import View, read_by
 from .walk import decided, is_open, parts, reads, ways
 
 
@@ -106,12 +106,8 @@ def _check_unused(view: View, diagnostics: Diagnostics) -> None:
             diagnostics.add("unused", definition.span, f"'{name}' is {what} that nothing uses")
 
 
-def _read_parameters(view: View) -> set[str]:
+def _read_parameters(view: View) -> frozenset[str]:
     """The parameters that something reads, their own updates apart; those of operators that nothing uses count
     as read, since the operators themselves are reported."""
-    read: set[str] = set()
-    for uses in view.uses:
-        read |= uses.read
-        for name, several in uses.feeds:
-            read |= several - {name}
-    return read | {name for name in view.model.parameters if name not in view.assignments}
+    read = frozenset().union(*(view.ask_in_turn(read_by, production) for production in view.productions))
+    return read.union(name for name in view.model.parameters if name not in view.writes)

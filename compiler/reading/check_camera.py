@@ -67,7 +67,7 @@ def _shapes(view: View) -> Iterator[tuple[Primitive, affine.Matrix]]:
         placed = view.ask(placed_by, body, given=(view.seed,))
         tried += placed.tried
         for leaf, inner in placed.leaves:
-            matrix = affine.compose(outer, inner)
+            matrix = inner if outer is affine.IDENTITY else affine.compose(outer, inner)
             if isinstance(leaf, Primitive):
                 yield leaf, matrix
             elif leaf.symbol in symbols and depth < MAX_DEPTH:

@@ -59,9 +59,8 @@ def check_recursion(view: View, diagnostics: Diagnostics) -> None:
 
 def _starts_of(view: View, members: list[Symbol]) -> Values:
     """What parameters in the guards of a recursion have where it is entered: all that it needs to know of the scene."""
-    inside = view.ask(operators_back, *members, given=(view.seed,))
-    names = {name for symbol in members for name in view.ask(guards_read, symbol.production)}
-    return tuple((name, starts_of(view, name, inside)) for name in sorted(names))
+    inside, names = view.ask(needs_of, *members, given=(view.seed,))
+    return tuple((name, starts_of(view, name, inside)) for name in names)
 
 
 # --- questions
@@ -86,10 +85,11 @@ def said_of_cycle(*given: Any) -> list[Diagnostic]:
     return diagnostics.items
 
 
-def operators_back(*given: Any) -> frozenset[int]:
-    """The ids of the operators on the ways round."""
+def needs_of(*given: Any) -> tuple[frozenset[int], tuple[str, ...]]:
+    """The ids of the operators on the ways round, and the parameters in guards."""
     *members, seed = given
-    return frozenset(id(operator) for _, way in _ways_back(members, seed) for operator in way.operators)
+    inside = frozenset(id(operator) for _, way in _ways_back(members, seed) for operator in way.operators)
+    return inside, tuple(sorted({name for symbol in members for name in guards_read(symbol.production)}))
 
 
 def endings(production: Production, seed: float) -> tuple[frozenset[str], ...]:

@@ -15,10 +15,10 @@ from typing import Iterable, Iterator, NamedTuple
 from . import affine
 from .diagnostics import Diagnostic, Diagnostics
 from .evaluate import NotFinite, fold
-from .intervals import ALL, Interval, interval_of
+from .intervals import ALL, Ask, Interval, interval_of
 from .model import Apply, Assign, Calculate, Constant, Expression, Operator, Production, Read, Step, Transform
 from .source import Span
-from .view import View, own_expressions
+from .view import View, operators_in, own_expressions
 from .walk import expressions_of, parts, reads
 
 # Angles that people write when they think in radians, and no whole number of degrees.
@@ -29,20 +29,23 @@ INEXACT = frozenset("divide sqrt sin cos tan asin acos atan2 exp log pow mix ran
 Intervals = dict[str, Interval]
 
 
-class OpenStep(NamedTuple):
-    """A step that only the values of parameters decide about: what it comes to, and the parameters that it reads."""
-
-    step: Step
-    values: tuple[Expression, ...]
-    reads: tuple[str, ...]
-
-
 class Steps(NamedTuple):
-    """What a Transformation's steps say: messages, those left open, and the parameters that are angles (operation, name)."""
+    """What a Transformation's steps say: messages, those left open (with what their arguments come to), and the parameters
+    that are angles (operation, name)."""
 
     messages: list[Diagnostic]
-    undecided: tuple[OpenStep, ...]
+    undecided: tuple[tuple[Step, tuple[Expression, ...]], ...]
     angles: tuple[tuple[str, str], ...]
+
+
+class Said(NamedTuple):
+    """What a production and its operators say: as Steps; ``reads`` are the parameters that undecided steps read, and
+    ``in_radians`` those that get an angle in radians, with its place."""
+
+    messages: list[Diagnostic]
+    angles: tuple[tuple[str, str], ...]
+    reads: tuple[str, ...]
+    in_radians: tuple[tuple[str, Span], ...]
 
 
 def check_values(view: View, diagnostics: Diagnostics) -> None:
@@ -61,27 +64,37 @@ def _identity(message: Diagnostic) -> tuple:
 
 
 def _messages(view: View) -> Iterator[Diagnostic]:
-    transforms = [operator for operator in view.operators if isinstance(operator, Transform)]
-    steps = [(operator, view.ask(steps_said, operator, given=(view.seed,))) for operator in transforms]
-    for operator in view.operators:
-        yield from view.ask(values_of_operator, operator, given=(view.seed,))
-    for production in view.productions:
-        yield from view.ask(values_of_production, production, given=(view.seed,))
+    every = [view.ask_in_turn(said_by, production, given=(view.seed,)) for production in view.productions]
     in_radians: dict[str, list[Span]] = {}
-    for operator in view.calculations:
-        for name, span in view.ask(assigned_in_radians, operator):
+    for said in every:
+        for name, span in said.in_radians:
             in_radians.setdefault(name, []).append(span)
-    for operator, said in steps:
+    for production, said in zip(view.productions, every):
         yield from said.messages
-        for operation, name in said.angles:
+        for operation, name in said.angles if in_radians else ():
             for span in in_radians.get(name, ()):
                 yield _in_radians(span, f"{operation} takes degrees, and '{name}' looks like radians")
-        for number, each in enumerate(said.undecided):
-            known = tuple((name, view.intervals[name]) for name in each.reads if name in view.intervals)
-            yield from view.ask(settled_step, operator, given=(view.seed, number, known))
+        if said.reads:
+            known = tuple((name, view.intervals[name]) for name in said.reads if name in view.intervals)
+            yield from view.ask_in_turn(settled_by, production, given=(view.seed, known))
 
 
 # --- questions
+
+
+def said_by(ask: Ask, production: Production, seed: float) -> Said:
+    messages = list(values_of_production(production, seed))
+    angles, read, in_radians = [], set(), []
+    for operator in operators_in(production):
+        messages += ask(values_of_operator, operator, given=(seed,))
+        if isinstance(operator, Transform):
+            steps = ask(steps_said, operator, given=(seed,))
+            messages += steps.messages
+            angles += steps.angles
+            read.update(name for _, values in steps.undecided for value in values for name in reads(value))
+        elif isinstance(operator, Calculate):
+            in_radians += ask(assigned_in_radians, operator)
+    return Said(messages, tuple(dict.fromkeys(angles)), tuple(sorted(read)), tuple(in_radians))
 
 
 def values_of_operator(operator: Operator, seed: float) -> list[Diagnostic]:
@@ -115,16 +128,18 @@ def steps_said(operator: Transform, seed: float) -> Steps:
         if all(isinstance(value, Constant) for value in values):
             messages += _flat(step, values)
         else:
-            undecided.append(OpenStep(step, values, tuple(sorted(set().union(*map(reads, values))))))
+            undecided.append((step, values))
     return Steps(messages, tuple(undecided), tuple(angles))
 
 
-def settled_step(operator: Transform, seed: float, number: int, known: tuple[tuple[str, Interval], ...]) -> list[Diagnostic]:
-    """What is said of the undecided step with that number, where parameters lie in the intervals that are ``known``."""
-    each = steps_said(operator, seed).undecided[number]
-    intervals = dict(known)
-    values = tuple(_settled(value, intervals) for value in each.values)
-    return _flat(each.step, values) if all(isinstance(value, Constant) for value in values) else []
+def settled_by(ask: Ask, production: Production, seed: float, known: tuple[tuple[str, Interval], ...]) -> list[Diagnostic]:
+    """What is said of undecided steps, where parameters lie in the intervals that are ``known``."""
+    intervals, found = dict(known), []
+    for operator in operators_in(production):
+        for step, values in ask(steps_said, operator, given=(seed,)).undecided if isinstance(operator, Transform) else ():
+            settled = tuple(_settled(value, intervals) for value in values)
+            found += _flat(step, settled) if all(isinstance(value, Constant) for value in settled) else []
+    return found
 
 
 # --- what is said

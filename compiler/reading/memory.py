@@ -26,15 +26,26 @@ class Memory:
     def ask(self, question: Callable[..., Any], *nodes: object, given: tuple[Hashable, ...] = ()) -> Any:
         """``question(*nodes, *given)``, worked out once; nodes are told apart by identity, what is given by value. The answer
         is shared: it must not be changed."""
-        key = (question, given, *map(id, nodes))
+        found = self._recall((question, given, *map(id, nodes)))
+        return found[1] if found is not None else self._keep(question, given, nodes, question(*nodes, *given))
+
+    def ask_in_turn(self, question: Callable[..., Any], *nodes: object, given: tuple[Hashable, ...] = ()) -> Any:
+        """As ``ask``, of a question that asks others: ``question(ask, *nodes, *given)``."""
+        found = self._recall((question, given, *map(id, nodes)))
+        return found[1] if found is not None else self._keep(question, given, nodes, question(self.ask, *nodes, *given))
+
+    def _recall(self, key: tuple) -> tuple[tuple, Any] | None:
         found = self._asked.get(key)
         if found is None:
             found = self._known.get(key)
-            if found is None:
-                found = nodes, question(*nodes, *given)  # the nodes, so that their ids stay their own
-                self._known[key] = found
-            self._asked[key] = found
-        return found[1]
+            if found is not None:
+                self._asked[key] = found
+        return found
+
+    def _keep(self, question: Callable[..., Any], given: tuple, nodes: tuple, answer: Any) -> Any:
+        key = (question, given, *map(id, nodes))
+        self._known[key] = self._asked[key] = nodes, answer  # the nodes, so that their ids stay their own
+        return answer
 
     def end_round(self) -> None:
         """Forget what wasn't asked since the last call: it is about nodes that are gone."""

@@ -101,7 +101,8 @@ class Resolver:
         for block in self.names.blocks:
             self.names.reporting(lambda: self.block(block), None)
         for entry in list(entries.values()):
-            self.names.reporting(lambda: self.force(entry), None)
+            if entry.kind != "parameter":
+                self.names.reporting(lambda: self.force(entry), None)
         if self.settings:
             model.settings = Record("settings", tuple(self.settings.items()))
         if self.names.meanings is not None:

@@ -115,7 +115,11 @@ class Names:
             else:
                 self._define(node)
         for node in definitions:
-            for name in assigned_names(node):
+            if isinstance(node, syntax.Selection) and self.meanings is not None:
+                names: Iterable[syntax.Name] = self.meanings.once(node, "assigned", lambda: tuple(assigned_names(node)))
+            else:
+                names = assigned_names(node) if isinstance(node, syntax.Calculation | syntax.Selection) else ()
+            for name in names:
                 self._assign(name)
 
     def _expand(self, file: syntax.File) -> Iterator[syntax.Definition]:
@@ -245,7 +249,9 @@ class Names:
         return value
 
     def _still_holds(self, meaning: Meaning) -> bool:
-        return self.has_same_edges() or all(self.leads_to(name, other) is answer for name, other, answer in meaning.reached)
+        if not meaning.reached or self.has_same_edges():
+            return True
+        return all(self.leads_to(name, other) is answer for name, other, answer in meaning.reached)
 
     def refer(self, entry: Entry, span: Span) -> None:
         """Note that ``entry`` is used at ``span``."""

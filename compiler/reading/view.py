@@ -7,15 +7,15 @@ Example::
 
     view = View(model, Memory())
     for way in view.ways(model.symbols["Tree"].production): …
-    view.assignments["n"]           # all Assigns to 'n'
+    view.writes["n"]                # what is assigned to 'n'
 """
 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from .intervals import Interval, intervals_of
+from .intervals import Ask, Interval, intervals_of
 from .linear import form
 from .memory import Memory
 from .model import Assign, Calculate, Enter, Expression, Model, Operator, Primitive, Production
@@ -32,7 +32,8 @@ class Uses(NamedTuple):
 
 class View:
     def __init__(self, model: Model, memory: Memory) -> None:
-        self.model, self.ask, self.seed = model, memory.ask, seed_of(model)
+        self.model, self.seed = model, seed_of(model)
+        self.ask, self.ask_in_turn = memory.ask, memory.ask_in_turn
         self.productions: list[Production] = [placed.body for placed in model.objects]  # type: ignore[misc]
         self.productions += [symbol.production for symbol in model.symbols.values()]
 
@@ -51,30 +52,18 @@ class View:
 
     @cached_property
     def calculations(self) -> list[Calculate]:
-        return [operator for operator in self.operators if isinstance(operator, Calculate)]
-
-    @cached_property
-    def assignments(self) -> dict[str, list[Assign]]:
-        found: dict[str, list[Assign]] = {}
-        for operator in self.calculations:
-            for statement in operator.statements:
-                if isinstance(statement, Assign):
-                    found.setdefault(statement.parameter, []).append(statement)
-        return found
+        found = {id(each): each for production in self.productions for each in self.ask(calculations_in, production)}
+        return list(found.values())
 
     @cached_property
     def writes(self) -> dict[str, list[tuple[int, float | None]]]:
         """What operators assign to each parameter: (the operator's id, the constant or None)."""
-        found: dict[str, list[tuple[int, float | None]]] = {}
-        for operator in self.calculations:
-            for name, value in self.ask(constants_of, operator):
-                found.setdefault(name, []).append((id(operator), value))
-        return found
+        return self.ask_in_turn(_writes_of, *self.calculations)
 
     @cached_property
     def intervals(self) -> dict[str, Interval]:
         """Where the values of each assigned parameter lie."""
-        return self.ask(_intervals_of, *self.calculations, given=(self.ask,))
+        return self.ask_in_turn(intervals_of, *self.calculations)
 
     @cached_property
     def reached(self) -> set[str]:
@@ -98,9 +87,12 @@ class View:
 # --- questions
 
 
-def _intervals_of(*given: Any) -> dict[str, Interval]:
-    *calculations, ask = given
-    return intervals_of(ask, *calculations)
+def _writes_of(ask: Ask, *calculations: Calculate) -> dict[str, list[tuple[int, float | None]]]:
+    found: dict[str, list[tuple[int, float | None]]] = {}
+    for operator in calculations:
+        for name, value in ask(constants_of, operator):
+            found.setdefault(name, []).append((id(operator), value))
+    return found
 
 
 def ways_of(production: Production) -> tuple[Way, ...]:
@@ -113,6 +105,10 @@ def entered_by(production: Production) -> frozenset[str]:
 
 def operators_in(production: Production) -> tuple[Operator, ...]:
     return tuple({id(each): each for way in ways(production) for each in way.operators}.values())
+
+
+def calculations_in(production: Production) -> tuple[Calculate, ...]:
+    return tuple(each for each in operators_in(production) if isinstance(each, Calculate))
 
 
 def own_expressions(production: Production) -> list[Expression]:
@@ -149,3 +145,10 @@ def uses_of_operator(operator: Operator) -> Uses:
 
 def uses_of_production(production: Production) -> Uses:
     return Uses(frozenset().union(*map(reads, own_expressions(production))))
+
+
+def read_by(ask: Ask, production: Production) -> frozenset[str]:
+    """The parameters that a production and its operators read, their own updates apart."""
+    every = [uses_of_production(production), *(ask(uses_of_operator, each) for each in operators_in(production))]
+    fed = (several - {name} for uses in every for name, several in uses.feeds)
+    return frozenset().union(*(uses.read for uses in every), *fed)
