@@ -16,7 +16,7 @@ enum { DEFAULT_CACHE = 1 << 20, LARGE_FRONT = 1 << 14, MOST_THREADS = 64 };
  * touching should stay there (engine measurements: residency, not arithmetic, decides), beside stacks and pixels. */
 #define CACHE_SHARE 0.45
 /* Where the graph itself is larger than that: a little more than it needs. */
-#define LEAST_GROWTH 1.2
+#define LEAST_GROWTH 1.17
 /* What there may be at once while building: a process that traces takes SPARE more than its scene anyway. */
 #define SPARE (256 << 10)
 #define MOST_AT_ONCE 1.05
@@ -31,10 +31,11 @@ static double cache_bytes(void)
     return CACHE_SHARE * (double)(size > 0 ? size : DEFAULT_CACHE);
 }
 
-/* What is there while fronts are built and gone afterwards: states before they are packed, compositions. */
+/* What is there while fronts are built and gone afterwards: states before they are packed, compositions, hulls. */
 static double building_bytes(const pl_scene *scene, const pl_compositions *compositions)
 {
-    return (double)scene->states.bytes + (double)pl_compositions_bytes(compositions);
+    return (double)scene->states.bytes + (double)pl_compositions_bytes(compositions) +
+           (double)pl_front_hulls_bytes(&scene->states);
 }
 
 /* A plan for what the scene's options ask for: so many items; as much as fits into `memory`; or what pays, as far as the
@@ -80,9 +81,25 @@ static bool choose(const pl_scene *scene, const pl_compositions *compositions, d
 
 /* --- one front --- */
 
+/* Rays that go together are among different items where they are as far apart as some items are large. */
+#define WIDE_ITEMS 3.5
+#define WIDEST 0.5
+
+static float wide_of(const pl_front_items *items)
+{
+    double sum = 0.0; /* of the sides of a cube with a box's surface */
+    for (size_t i = 0; i < items->box_count; i++) {
+        const pl_boxed *box = &items->boxes[i];
+        const float x = box->hi[0] - box->lo[0], y = box->hi[1] - box->lo[1], z = box->hi[2] - box->lo[2];
+        sum += sqrtf((x * y + y * z + z * x) / 3.0f);
+    }
+    return (float)fmin(WIDEST, WIDE_ITEMS * sum / (double)(items->box_count + 1));
+}
+
 /* Builds a front's tree and gives it its items; what they were listed with is freed. */
 static bool keep(pl_front *front, pl_front_items *items, int threads)
 {
+    front->wide = wide_of(items);
     front->nodes = pl_front_tree(items->boxes, items->box_count, &front->node_count, &front->root, threads);
     front->primitives = items->primitives;
     front->instances = items->instances;
@@ -254,6 +271,7 @@ static bool build_planned(const pl_scene *scene, const pl_compositions *composit
     pl_front_plan *plan = NULL;
     bool ok = choose(scene, compositions, share, fronts, &plan, error);
     if (ok && !list_fronts(fronts, plan)) ok = pl_fail_memory(error, "building the fronts");
+    if (ok && !scene->states.cuts) plan->hulls = pl_front_hulls_create(plan);
     ok = ok && build_fronts(scene, plan, fronts, error);
     for (uint32_t i = 0; ok && i < fronts->count; i++)
         add_to(fronts, &fronts->list[i], &plan->counts[fronts->list[i].state]);

@@ -11,6 +11,7 @@
  *
  *     front_pilot.c  rays -> visits      front_plan.c, front_levels.c  visits, budget -> what is opened where
  *     front_open.c   state -> items      front_tree.c  items -> nodes      front.c  all fronts
+ *     front_hull.c   boxes of instances
  *     front_pyramid.c  many rays of the eye at once
  *
  * References (pl_ref) name a node, a primitive or an instance of a front: kind in the top 4 bits, index below. */
@@ -106,6 +107,7 @@ typedef struct pl_front {
     double centre[4], scale; /* unit frame: (p - centre) * scale */
     float half[4];           /* of the box in the unit frame */
     pl_front_bounds bounds;
+    float wide;              /* rays farther apart in the unit frame are soon among different items */
     float slack_gain, slack_base; /* no normative hit lies farther outside its box, there, than gain * distance + base */
     pl_box box;              /* of the bounded items, in the state's frame */
     pl_reach reach;
@@ -231,6 +233,7 @@ typedef struct pl_front_plan {
     double estimate, entries; /* bytes; instances that a ray enters */
     pl_front_counts *counts;  /* of each front */
     pl_front_counting counting;
+    struct pl_front_hulls *hulls; /* NULL: none */
     const struct pl_front_levels *levels; /* to be chosen from at each price; NULL: they are chosen */
 } pl_front_plan;
 
@@ -283,6 +286,22 @@ pl_front_levels *pl_front_levels_create(const pl_front_plan *plan);
 
 /* Chooses levels at a price: the states of all others are price_free. */
 void pl_front_levels_choose(const pl_front_levels *levels, double price, pl_front_plan *plan);
+
+/* --- front_hull.c --- */
+
+/* At once. */
+enum { PL_FRONT_MOST_HULLS = 256 };
+
+/* For a plan that has visits; NULL: no memory. Boxes are looser without. */
+typedef struct pl_front_hulls pl_front_hulls;
+pl_front_hulls *pl_front_hulls_create(const pl_front_plan *plan);
+void pl_front_hulls_free(pl_front_hulls *hulls, uint32_t states);
+
+/* No more than they take. */
+size_t pl_front_hulls_bytes(const pl_states *states);
+
+/* The box of what may be met of an instance under a map that has the item's own transformations in it. hulls: NULL: none. */
+pl_box pl_front_instance_box(const pl_front_hulls *hulls, const pl_states *states, const pl_item *item, const pl_affine *to_parent);
 
 /* --- front_tree.c --- */
 

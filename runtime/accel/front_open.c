@@ -281,9 +281,7 @@ static void add_instance(opening *o, const chain *at, const pl_item *item, bool 
     pl_front_set_frame(&inner, states, item->what);
     set_instance_map(it, o->items->fine ? &o->items->fine[place] : NULL, o->front, &inner, at, &bounds);
     if (inner.framed) join_bounds(&o->bounds, &bounds);
-    /* Where there are cut-offs the whole box may be drawn (cut.h). */
-    const pl_box box = states->cuts ? pl_box_map(&at->to_parent, &states->list[item->what].box)
-                                    : pl_box_under(states, item, &at->to_parent);
+    const pl_box box = pl_front_instance_box(o->plan->hulls, states, item, &at->to_parent);
     set_box(o, o->items->primitive_count + place, &box, states->list[item->what].unbounded,
             pl_ref_of(PL_KIND_INSTANCE, (uint32_t)place));
 }

@@ -217,6 +217,7 @@ pl_front_plan *pl_front_plan_create(const pl_compositions *compositions, const p
 void pl_front_plan_free(pl_front_plan *plan)
 {
     if (!plan) return;
+    if (plan->hulls) pl_front_hulls_free(plan->hulls, plan->compositions->states->count);
     free(plan->order);
     free(plan->front_of);
     free(plan->bytes);

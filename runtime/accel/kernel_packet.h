@@ -12,9 +12,6 @@
 #include "kernel_lanes.h"
 #include "kernel_offer.h"
 
-/* As wide as this in the front's unit frame, rays are soon among different items. */
-#define WIDE 0.5f
-
 /* So few go on alone. */
 enum { FEW = 2 };
 
@@ -148,7 +145,7 @@ static inline bool look_along(beam *b, const pl_packet_frame *f)
         span_of(f->inverse[axis], f->lanes, &least, &most);
         const bool negative = most < 0.0f;
         if (!negative && !(least > 0.0f)) return false;
-        if (o_most - o_least > WIDE) return false;
+        if (o_most - o_least > f->front->wide) return false;
         o_least -= f->slack;
         o_most += f->slack;
         b->near_o[axis] = wide_set(negative ? o_least : o_most);

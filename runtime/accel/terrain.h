@@ -36,6 +36,9 @@ enum {
     PL_KIND_TILE = 1 /* of references in a terrain's tree */
 };
 
+/* As far apart in the unit frame rays of a packet may be. */
+#define PL_TERRAIN_WIDE 0.5f
+
 /* The triangles' transformation: number i of its matrix (pl_affine) is cell plus[i] - cell minus[i]. */
 typedef struct pl_terrain_form {
     uint32_t node;         /* transform_code */

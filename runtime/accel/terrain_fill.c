@@ -378,6 +378,7 @@ static bool set_frame(pl_terrain *terrain, const bounds *b)
     pl_state state = {.box = b->box, .reach = reach_of(b)};
     const pl_states states = {.list = &state};
     pl_front_set_frame(&terrain->front, &states, 0);
+    terrain->front.wide = PL_TERRAIN_WIDE;
     return terrain->front.framed && isfinite(state.reach.base) && terrain->front.scale < 1e300;
 }
 

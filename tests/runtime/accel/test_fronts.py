@@ -236,6 +236,28 @@ def test_few_tall_fronts_stand_for_many_low_ones():
         assert scene.statistics["instances"] < graph.statistics["instances"] / 6
 
 
+DIAMONDS = """
+camera { location <0, 0, -9> look_at <0, 0, 0> }
+light_source { <0, 5, -9> color rgb 1 }
+object { Both }
+Selection Both    { Both -> [ rotz 45 ] Diamond + [ trans 9 0 0; rotz 45 ] Diamond; }
+Selection Diamond { Diamond -> Side + [ rotz 90 ] Side + [ rotz 180 ] Side + [ rotz 270 ] Side; }
+Selection Side    { Side -> %s; }
+""" % " + ".join(f"[ trans {i / 8} {1 - i / 8} 0; scale 0.05 ] sphere" for i in range(8))
+
+
+def test_boxes_of_instances_turn_with_what_is_in_them(tmp_path):
+    """A diamond that stands on its side is a square: nothing is entered where the corners of its box, turned, would be."""
+    path = tmp_path / "diamonds.plsys"
+    path.write_text(DIAMONDS)
+    origins = np.array([(0, 1.2, -5), (0, -1.2, -5), (1.2, 0, -5), (-1.2, 0, -5)], float)
+    corner = np.array([(0.7071, 0.7071, -5)])
+    with Scene(compile(path), front_items=1, threads=1) as scene:
+        scene.intersect(origins, np.tile((0.0, 0.0, 1.0), (4, 1)))
+        assert scene.statistics["instances"] <= 4  # of Both
+        assert np.isfinite(scene.intersect(corner, np.array([(0.0, 0.0, 1.0)])).t).all()
+
+
 def test_what_occurs_once_needs_no_front():
     """A forest's ten thousand places stand in the scene's own front."""
     data = compile(ROOT / "scenes" / "forest.plsys", parameters={"order": 4})
