@@ -62,6 +62,8 @@ typedef struct pl_bvh_work {
     pl_packet_frame *packets;
     uint64_t *packet_stack;
     size_t packet_capacity, packet_stack_capacity;
+    unsigned alone;      /* rays of a packet that go on one by one, the lowest first, its normative ray not yet told; or 0 */
+    uint32_t alone_from; /* … from this frame on */
 } pl_bvh_work;
 
 typedef bool pl_bvh_kernel(pl_tracer *tracer, const pl_ray *ray, pl_query *query);

@@ -279,6 +279,10 @@ static inline __attribute__((always_inline)) bool map_down(pl_bvh_work *w, const
     return true;
 }
 
+#ifdef PACKET_KERNEL
+static bool map_alone(pl_tracer *tracer, pl_error *error);
+#endif
+
 /* Evaluates a primitive of a frame normatively and offers it. The normative ray comes from the deepest frame above that knows
  * it. false: an error. */
 static bool evaluate(pl_tracer *tracer, pl_bvh_lane *lane, uint32_t frame, pl_ref ref, pl_query *query)
@@ -286,6 +290,9 @@ static bool evaluate(pl_tracer *tracer, pl_bvh_lane *lane, uint32_t frame, pl_re
     const pl_states *states = &tracer->scene->states;
     pl_bvh_work *w = tracer->work;
     uint32_t from = frame;
+#ifdef PACKET_KERNEL
+    if (w->alone && !map_alone(tracer, query->error)) return false;
+#endif
     while (!lane->frames[from].mapped) from--;
     double4 o = *(const double4 *)lane->frames[from].normative_o, d = *(const double4 *)lane->frames[from].normative_d;
     for (; from < frame; from++) {

@@ -70,6 +70,14 @@ static inline quad quad_below(const pl_bvh_work *w, size_t count, const pl_lanes
     return q;
 }
 
+/* The quads that some lanes are in. */
+static inline unsigned quads_of(unsigned lanes)
+{
+    unsigned quads = 0;
+    for (int i = 0; i < QUADS; i++) quads |= (unsigned)((lanes >> 4 * i & 15) != 0) << i;
+    return quads;
+}
+
 /* The normative rays of some quads of a frame. */
 static bool map_packet(const pl_scene *scene, pl_bvh_work *w, uint32_t index, unsigned quads, pl_error *error)
 {
@@ -101,9 +109,8 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     const pl_packet_frame *f = &w->packets[index];
     const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
     const pl_item *item = pl_front_item(&scene->states, p->item);
-    unsigned quads = 0;
+    unsigned quads = quads_of(lanes);
     size_t count;
-    for (int i = 0; i < QUADS; i++) quads |= (unsigned)((lanes >> 4 * i & 15) != 0) << i;
     if (!map_packet(scene, w, index, quads, queries->error)) return false;
     if (!pl_bvh_chain(w, f->front, p->opened, item, &count, queries->error)) return false;
     pl_lanes rays;

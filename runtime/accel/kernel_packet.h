@@ -185,6 +185,23 @@ static inline unsigned lanes_left(const pl_query *queries, unsigned lanes)
 
 /* --- the loop --- */
 
+/* The normative ray of a lane that goes on alone, when it has a candidate: mapped with those of others that do. */
+static bool map_alone(pl_tracer *tracer, pl_error *error)
+{
+    pl_bvh_work *w = tracer->work;
+    const int lane = __builtin_ctz(w->alone);
+    pl_frame *f = &w->lanes->frames[w->alone_from];
+    const pl_packet_frame *from = &w->packets[w->alone_from];
+    if (!map_packet(tracer->scene, w, w->alone_from, quads_of(w->alone) & ~from->mapped, error)) return false;
+    f->mapped = true;
+    for (int axis = 0; axis < 3; axis++) {
+        f->normative_o[axis] = from->normative.o[axis][lane];
+        f->normative_d[axis] = from->normative.d[axis][lane];
+    }
+    w->alone = 0;
+    return true;
+}
+
 /* The rays of some lanes one by one through what lies below frame `index` of the packet. */
 static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, bool any)
 {
@@ -194,7 +211,6 @@ static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, 
         const int lane = __builtin_ctz(lanes);
         pl_frame *f = &w->lanes->frames[index];
         float local_max = 1e30f;
-        for (uint32_t i = 0; i <= index; i++) w->lanes->frames[i].mapped = false;
         f->front = from->front;
         f->error = from->error;
         f->distance = from->distance;
@@ -206,14 +222,13 @@ static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, 
         local_max = local_t_max(f, t_max[lane]);
         bool met = begin_frame(f, o, d, t_max[lane], &local_max);
         if (!met && !f->front->unbounded_count) continue;
-        w->lanes->frames[0].mapped = true;
-        for (int axis = 0; axis < 3; axis++) {
-            w->lanes->frames[0].normative_o[axis] = w->packets[0].normative.o[axis][lane];
-            w->lanes->frames[0].normative_d[axis] = w->packets[0].normative.d[axis][lane];
-        }
+        w->alone = lanes;
+        w->alone_from = index;
         walk k;
-        if (!set_off(&k, w->lanes, &queries[lane], index, met) || !(any ? visit(tracer, &k, true) : visit(tracer, &k, false)))
-            return false;
+        const bool ok = set_off(&k, w->lanes, &queries[lane], index, met) &&
+                        (any ? visit(tracer, &k, true) : visit(tracer, &k, false));
+        w->alone = 0;
+        if (!ok) return false;
         t_max[lane] = queries[lane].t_max;
     }
     return true;
