@@ -102,7 +102,8 @@ class SceneState:
         if bool(self.objects) is not had_objects:
             for part in self.parts:
                 part.outcome = None
-        self.fresh = [part for part in self.parts if part not in parts]
+        self.fresh = [part for part in self.parts if part not in parts or part in self.parts.touched]
+        self.parts.touched.clear()
         if self.parts.base.outcome is None:
             self.fresh.append(self.parts.base)
 

@@ -81,6 +81,7 @@ class Parts:
         self.shared: dict[str, dict[Block, None]] = {}  # shared blocks by the names that they define
         self.general: dict[Block, None] = {}
         self.base = Part([])
+        self.touched: dict[Part, None] = {}  # that lost their outcome without being made anew
         self._part_of: dict[Block, Part] = {}
 
     def __iter__(self) -> Iterator[Part]:
@@ -89,6 +90,7 @@ class Parts:
 
     def change(self, removed: Iterable[Block], added: Iterable[Block]) -> None:
         """Blocks went and came; parts that this touches lose their outcome or are made anew."""
+        removed, added = self._exchange(list(removed), list(added))
         seeds: dict[Block, None] = {}
         names: set[str] = set()
         for block in removed:
@@ -114,6 +116,35 @@ class Parts:
         for block in removed:
             seeds.pop(block, None)
         self._gather(seeds)
+
+    def _exchange(self, removed: list[Block], added: list[Block]) -> tuple[list[Block], list[Block]]:
+        """Let new blocks of the same role take the places of old ones: no part is made anew. What is left then."""
+        if len(removed) != len(added):
+            return removed, added
+        others = [(old, new) for old, new in zip(removed, added) if role_of(old) != role_of(new)]
+        for old, new in zip(removed, added):
+            role = role_of(new)
+            if role != role_of(old):
+                continue
+            self._unlink(old)
+            self._link(new)
+            part = self._part_of.pop(old, None)
+            if part is not None:
+                part.blocks[part.blocks.index(old)] = new
+                self._part_of[new] = part
+                self._touch(part)
+            using = list(self._depending(role.defined)) if role.kind == "shared" else []
+            for each in using:
+                if each in self._part_of:
+                    self._touch(self._part_of[each])
+            if role.kind == "general" or any(each in self.general for each in using):
+                for part in self:
+                    part.outcome = None
+        return [old for old, _ in others], [new for _, new in others]
+
+    def _touch(self, part: Part) -> None:
+        part.outcome = None
+        self.touched[part] = None
 
     def _link(self, block: Block) -> None:
         role = role_of(block)
