@@ -83,6 +83,7 @@ class Parts:
         self.base = Part([])
         self.touched: dict[Part, None] = {}  # that lost their outcome without being made anew
         self._part_of: dict[Block, Part] = {}
+        self._needed: dict[Part, dict[Block, None]] = {}  # as far as it was asked for
 
     def __iter__(self) -> Iterator[Part]:
         yield self.base
@@ -91,6 +92,8 @@ class Parts:
     def change(self, removed: Iterable[Block], added: Iterable[Block]) -> None:
         """Blocks went and came; parts that this touches lose their outcome or are made anew."""
         removed, added = self._exchange(list(removed), list(added))
+        if removed or added:
+            self._needed.clear()
         seeds: dict[Block, None] = {}
         names: set[str] = set()
         for block in removed:
@@ -128,6 +131,10 @@ class Parts:
                 continue
             self._unlink(old)
             self._link(new)
+            for needed in self._needed.values() if role.kind != "tied" else ():
+                if old in needed:
+                    del needed[old]
+                    needed[new] = None
             part = self._part_of.pop(old, None)
             if part is not None:
                 part.blocks[part.blocks.index(old)] = new
@@ -209,6 +216,12 @@ class Parts:
 
     def needed(self, part: Part) -> dict[Block, None]:
         """The general blocks, and the shared blocks that they or ``part`` need."""
+        found = self._needed.get(part)
+        if found is None:
+            found = self._needed[part] = self._find_needed(part)
+        return found
+
+    def _find_needed(self, part: Part) -> dict[Block, None]:
         found = dict(self.general)
         queue = [*part.blocks, *found]
         while queue:

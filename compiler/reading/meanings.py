@@ -46,8 +46,10 @@ class Meanings:
 
     def recall(self, node: syntax.Node, *given: Hashable) -> Any:
         """What was kept of ``node``, as far as the same was ``given``; None if nothing."""
-        found = self._of.get(node.span.source, {}).get((id(node), *given))
-        return found and found[1]
+        try:
+            return self._of[node.span.source][id(node), *given][1]
+        except KeyError:
+            return None
 
     def keep(self, node: syntax.Node, value: Any, *given: Hashable) -> None:
         self._of.setdefault(node.span.source, {})[id(node), *given] = (node, value)  # the node, so that its id stays its own

@@ -234,7 +234,7 @@ class Names:
         if self.meanings is None:
             return make()
         meaning = self.meanings.recall(node, *given)
-        if meaning is not None and self._still_holds(meaning):
+        if meaning is not None and (not meaning.reached or self._still_holds(meaning)):
             for name, span in meaning.references:
                 self.entries[name].definition.references.append(span)
             return meaning.value
@@ -249,9 +249,9 @@ class Names:
         return value
 
     def _still_holds(self, meaning: Meaning) -> bool:
-        if not meaning.reached or self.has_same_edges():
-            return True
-        return all(self.leads_to(name, other) is answer for name, other, answer in meaning.reached)
+        return self.has_same_edges() or all(
+            self.leads_to(name, other) is answer for name, other, answer in meaning.reached
+        )
 
     def refer(self, entry: Entry, span: Span) -> None:
         """Note that ``entry`` is used at ``span``."""
