@@ -63,7 +63,7 @@ class Scene:
         self._messages: dict[Block, list[Diagnostic]] = {}  # of resolving
         self._syntax: dict[Block, list[Diagnostic]] = {}
         self._ignoring: dict[Block, None] = {}  # blocks with `plsys-ignore` comments
-        # Blocks to be resolved: the last one first. A place is all that has changed in a block that was right.
+        # Blocks to be resolved: the last one first. A place is all that has changed, where the rest is right.
         self._edited: dict[Block, Span | None] = {}
         self._dirty: dict[Block, None] = {}  # then those that use what was edited
         self._opened: dict[Block, None] = {}  # and then those of a file that was opened, from its start
@@ -145,6 +145,8 @@ class Scene:
             for block in change.added:
                 self._learn(block)
                 self._names.learn(facts_of(block))
+                if waiting is self._opened:
+                    role_of(block)  # the whole-file checks ask for it, of all blocks at once
                 waiting[block] = None
                 yield
             if removed_includes or any(facts_of(block).includes for block in change.added if b"include" in block.data):
@@ -164,9 +166,12 @@ class Scene:
         touch = touch_of(old, new)
         if touch is None:
             return False
-        was_right = not any(old in table for table in (self._messages, self._edited, self._dirty, self._opened))
         facts, name = facts_of(old), facts_of(old).names[touch.index]
         reads = name.role in ("read", "target")
+        # Whether all else in the block is known to be right.
+        was_right = not any(old in table for table in (self._edited, self._dirty, self._opened)) and all(
+            name.start <= each.span.start and each.span.end <= name.end for each in self._messages.get(old, ())
+        )
         self._forget(old)
         if not reads:
             self._names.forget(facts)
@@ -192,7 +197,6 @@ class Scene:
             self._syntax[block] = facts.syntax
         if IGNORE_WORD in block.data:
             self._ignoring[block] = None
-        role_of(block)  # the whole-file checks ask for it, of all blocks at once
         for each in facts.blocks:
             if each.name.name in self.singles:
                 self.singles[each.name.name][block] = None
