@@ -85,11 +85,14 @@ class Positions:
         return offset + byte_column(text, character, self.encoding)
 
     def position(self, offset: int) -> dict:
-        line, before = self.text.locate(offset)
+        return self._position(*self.text.locate(offset))
+
+    def _position(self, line: int, before: bytes) -> dict:
         return {"line": line, "character": len(before) if before.isascii() else units(before, self.encoding)}
 
     def range(self, start: int, end: int) -> dict:
-        return {"start": self.position(start), "end": self.position(end)}
+        first, last = self.text.locate_both(start, end)
+        return {"start": self._position(*first), "end": self._position(*last)}
 
     def offsets(self, range_: dict) -> tuple[int, int]:
         """Start and end of a protocol's range."""

@@ -135,10 +135,22 @@ class Text:
 
     def locate(self, offset: int) -> tuple[int, bytes]:
         """The line with the byte at ``offset``, and that line's text before it."""
-        index = self.index_at(offset)
-        block, inside = self.blocks[index], offset - self._starts[index]
-        line = bisect_right(block.line_starts, inside) - 1
-        return self._lines[index] + line, block.data[block.line_starts[line] : inside].rstrip(b"\r\n")
+        return self.locate_both(offset, offset)[0]
+
+    def locate_both(self, start: int, end: int) -> tuple[tuple[int, bytes], tuple[int, bytes]]:
+        """As ``locate``, of the two ends of a range: mostly of one line, which is found once."""
+        index = self.index_at(start)
+        block, base = self.blocks[index], self._starts[index]
+        starts, inside = block.line_starts, start - base
+        line = bisect_right(starts, inside) - 1
+        low, number = starts[line], self._lines[index] + line
+        first = number, block.data[low:inside].rstrip(b"\r\n")
+        if start == end:
+            return first, first
+        high = starts[line + 1] if line + 1 < len(starts) else len(block.data)
+        if end < base + high:
+            return first, (number, block.data[low : end - base].rstrip(b"\r\n"))
+        return first, self.locate(end)
 
     def line_of(self, offset: int) -> int:
         return self.locate(offset)[0]

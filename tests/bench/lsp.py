@@ -211,8 +211,9 @@ def cursors(bench: Bench, count: int) -> None:
 
 
 def all_of_cursors(bench: Bench, count: int) -> None:
-    """As ``cursors``, up to where all is known."""
+    """As ``cursors``, up to where all is known. What is left of edits before isn't counted."""
     what = "100 cursors → all diagnostics (pull)"
+    bench.client.request("textDocument/diagnostic", {"textDocument": {"uri": bench.uri}})
     for _ in range(count // 2):
         places = sorted({(p["line"], p["character"]) for p in (bench.place() for _ in range(100))}, reverse=True)
         changes = [{"line": line, "character": character} for line, character in places]

@@ -37,6 +37,17 @@ def test_positions_and_offsets(encoding, text):
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
+def test_a_range_is_the_places_of_its_ends(encoding):
+    text = "camera { }\r\nSelection A\n{ A -> b; }\n/* é💡 */\rCalculation B { n = 1; }".encode()
+    positions = Positions(Text("x", None, text), encoding)
+    places = [i for i in range(len(text) + 1) if i == len(text) or text[i] & 0xC0 != 0x80]
+    for start in places:
+        for end in places:
+            if start <= end:
+                assert positions.range(start, end) == {"start": positions.position(start), "end": positions.position(end)}
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
 def test_places_outside_of_the_text_are_taken_to_its_ends(encoding):
     positions = Positions(Text("x", None, b"ab\r\ncd"), encoding)
     assert [positions.offset(*place) for place in ((0, 99), (1, 99), (7, 0), (-1, 5), (0, -3))] == [2, 6, 6, 0, 0]
