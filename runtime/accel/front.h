@@ -121,6 +121,12 @@ static inline const pl_item *pl_front_item(const pl_states *states, uint32_t ite
     return &states->items[item & ~PL_NO_SHADOW];
 }
 
+/* Whether an item has primitives. */
+static inline bool pl_front_occurs(const pl_states *states, const pl_item *item)
+{
+    return item->kind != PL_NODE_ENTER || states->list[item->what].primitives > 0;
+}
+
 /* Adds the items on the way through a front: those of the states opened down to `opened`, then `last`. false: no memory. */
 bool pl_front_add_items(pl_items *items, const pl_states *states, const pl_front *front, uint32_t opened, const pl_item *last);
 

@@ -17,7 +17,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { MOST_LEVELS = 64, MOST_WORK = 1 << 24 };
+enum { MOST_LEVELS = 64, MOST_WORK = 1 << 22 };
 
 struct pl_front_levels {
     uint32_t count; /* of levels besides the scene itself, which is level 0 … */
@@ -60,7 +60,7 @@ static void add_bytes(pl_front_levels *levels, uint32_t end, const pl_front_plan
         bytes[index] = sizeof(pl_opened);
         for (uint32_t k = 0; k < state->item_count; k++) {
             const pl_item *item = &state->items[k];
-            if (pl_item_primitives(states, item) == 0) continue;
+            if (!pl_front_occurs(states, item)) continue;
             if (item->kind != PL_NODE_ENTER) bytes[index] += pl_front_primitive_bytes();
             else if (plan->single[item->what] || states->list[item->what].depth > levels->depth[end])
                 bytes[index] += bytes[item->what];

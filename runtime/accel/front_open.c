@@ -317,7 +317,7 @@ static bool open_state(opening *o, const place *from)
     for (uint32_t i = it->item_count; i-- > 0;) {
         const pl_item *item = &it->items[i];
         const size_t composition = made->first[state] + i;
-        if (pl_item_primitives(states, item) == 0) continue;
+        if (!pl_front_occurs(states, item)) continue;
         const bool no_shadow = from->no_shadow || item->no_shadow;
         const double reached = from->reached * (double)o->plan->probability[composition];
         if (item->kind == PL_NODE_ENTER && pl_front_opens(o->plan, o->plan->threshold[o->front->state], reached, item->what)) {

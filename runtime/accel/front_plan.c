@@ -44,11 +44,6 @@
 
 enum { PRICES = 48 };
 
-static bool occurs(const pl_states *states, const pl_item *item)
-{
-    return pl_item_primitives(states, item) > 0;
-}
-
 /* --- what is known of states before any price --- */
 
 static int deeper(const void *a, const void *b)
@@ -79,12 +74,12 @@ static void find_free(pl_front_plan *plan, bool once_is_free)
     for (uint32_t i = 0; once_is_free && i < states->count; i++)
         for (uint32_t k = 0; k < states->list[i].item_count; k++) {
             const pl_item *item = &states->list[i].items[k];
-            if (item->kind == PL_NODE_ENTER && occurs(states, item)) references[item->what]++;
+            if (item->kind == PL_NODE_ENTER && pl_front_occurs(states, item)) references[item->what]++;
         }
     for (uint32_t i = 0; i < states->count; i++) {
         const pl_state *state = &states->list[i];
         uint32_t live = 0;
-        for (uint32_t k = 0; k < state->item_count; k++) live += occurs(states, &state->items[k]);
+        for (uint32_t k = 0; k < state->item_count; k++) live += pl_front_occurs(states, &state->items[k]);
         plan->single[i] = plan->price_free[i] = (live <= 1 && !state->endless) || references[i] == 1;
     }
     memset(references, 0, states->count * sizeof *references);
@@ -99,7 +94,7 @@ static double find_zoom(const pl_front_plan *plan, const double *zoom, uint32_t 
     if (state->endless) return INFINITY;
     for (uint32_t k = 0; k < state->item_count; k++) {
         const pl_item *item = &state->items[k];
-        if (item->kind != PL_NODE_ENTER || !occurs(states, item)) continue;
+        if (item->kind != PL_NODE_ENTER || !pl_front_occurs(states, item)) continue;
         const double stretch = plan->compositions->list[plan->compositions->first[index] + k].stretch;
         const double grown = stretch * pl_front_scale(states, item->what) / pl_front_scale(states, index);
         largest = fmax(largest, grown * zoom[item->what]);
@@ -117,7 +112,7 @@ static double find_below(const pl_front_plan *plan, const double *zoom, const do
     if (state->endless) return INFINITY;
     for (uint32_t k = 0; k < state->item_count; k++) {
         const pl_item *item = &state->items[k];
-        if (item->kind != PL_NODE_ENTER || !occurs(states, item)) continue;
+        if (item->kind != PL_NODE_ENTER || !pl_front_occurs(states, item)) continue;
         largest = fmax(largest, fmax(below[item->what], plan->price_free[item->what] ? 0.0 : zoom[item->what]));
     }
     return largest;
@@ -152,7 +147,7 @@ static void find_bytes(pl_front_plan *plan)
         double bytes = sizeof(pl_opened);
         for (uint32_t k = 0; k < state->item_count; k++) {
             const pl_item *item = &state->items[k];
-            if (!occurs(states, item)) continue;
+            if (!pl_front_occurs(states, item)) continue;
             if (item->kind != PL_NODE_ENTER) bytes += PRIMITIVE_BYTES;
             else bytes += instance_bytes + (plan->price_free[item->what] ? plan->bytes[item->what] : 0.0);
         }
@@ -289,7 +284,7 @@ static bool count_below(const pl_front_plan *plan, pl_front_counting *counting, 
         }
         for (uint32_t i = 0; i < it->item_count; i++) {
             const pl_item *item = &it->items[i];
-            if (!occurs(states, item)) continue;
+            if (!pl_front_occurs(states, item)) continue;
             const double reached = at.reached * (double)probabilities[i];
             if (item->kind != PL_NODE_ENTER) {
                 counts->primitives++;
