@@ -25,6 +25,13 @@ typedef struct cell {
     pl_bounds bounds;
 } cell;
 
+/* What a map of ranges made of bounds: that of a repeated branch is asked for again at once. */
+enum { KEPT_MAPS = 4 };
+typedef struct mapped {
+    pl_range_map map;
+    pl_bounds below, above;
+} mapped;
+
 typedef struct level {
     uint32_t node, next; /* which of its subtrees comes next */
     uint32_t cell;       /* of an enter node */
@@ -42,6 +49,8 @@ struct pl_class_walk {
     uint32_t buckets[BUCKETS];
     pl_range *scope, *live; /* at the current node; of the class being looked up */
     pl_range_result result;
+    mapped *kept;
+    unsigned kept_next;
     uint64_t work, visited;
     bool unknown; /* it came to something of which nothing can be known */
     bool (*known)(void *context, uint32_t symbol, const pl_range *live);
@@ -60,7 +69,8 @@ pl_class_walk *pl_class_walk_create(const pl_program *program, pl_mesh_tree *con
     w->cells.element = sizeof(cell);
     w->scope = malloc((program->parameter_count + 1) * sizeof *w->scope);
     w->live = malloc((program->parameter_count + 1) * sizeof *w->live);
-    if (w->scope && w->live) return w;
+    w->kept = calloc(KEPT_MAPS, sizeof *w->kept);
+    if (w->scope && w->live && w->kept) return w;
     pl_class_walk_free(w);
     return NULL;
 }
@@ -72,6 +82,7 @@ void pl_class_walk_free(pl_class_walk *w)
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]->data);
     free(w->scope);
     free(w->live);
+    free(w->kept);
     free(w);
 }
 
@@ -295,6 +306,21 @@ static uint32_t next_subtree(pl_class_walk *w, level *l)
     return NONE;
 }
 
+static void pass_range(pl_class_walk *w, const pl_range_map *map, pl_bounds *bounds)
+{
+    for (unsigned i = 0; i < KEPT_MAPS; i++) {
+        const mapped *m = &w->kept[i];
+        if (memcmp(&m->below, bounds, sizeof *bounds) || memcmp(&m->map, map, sizeof *map)) continue;
+        *bounds = m->above;
+        return;
+    }
+    mapped *m = &w->kept[w->kept_next++ % KEPT_MAPS];
+    m->map = *map;
+    m->below = *bounds;
+    pl_bounds_through_range(map, bounds);
+    m->above = *bounds;
+}
+
 /* Takes a subtree's bounds to the level above. true: *node is to be bounded next. */
 static bool ascend(pl_class_walk *w, pl_bounds *bounds, bool fresh, uint32_t *node)
 {
@@ -305,7 +331,7 @@ static bool ascend(pl_class_walk *w, pl_bounds *bounds, bool fresh, uint32_t *no
         break;
     case PL_NODE_TRANSFORM_CODE: {
         const pl_range_map *map = (const pl_range_map *)w->maps.data + l->map;
-        pl_bounds_through_range(map, bounds);
+        pass_range(w, map, bounds);
         if (!(map->inverse_stretch < INFINITY)) { /* may be singular and dropped */
             bounds->count = UINT64_MAX;
             bounds->fewest = 0;

@@ -92,8 +92,9 @@ static double reach_of(const pl_hull *hull)
     return pl_box_reach(&box);
 }
 
-/* v lies between three directions of the lattice: those at the corners of half a square of the surface. */
-static double support_along(const pl_hull *hull, double reach, const double v[3])
+/* v lies between three directions of the lattice: those at the corners of half a square of the surface. Roundings, in proportion
+ * to the hull's reach, are left to the caller. */
+static inline double support_along(const pl_hull *hull, const double v[3])
 {
     const double a[3] = {fabs(v[0]), fabs(v[1]), fabs(v[2])};
     const int first = a[1] > a[0], most = a[2] > a[first] ? 2 : first, second = most == 2 ? 0 : !first, third = 3 - most - second;
@@ -107,43 +108,47 @@ static double support_along(const pl_hull *hull, double reach, const double v[3]
     y -= row;
     const double sum = x >= y ? (1.0 - x) * h[0] + (x - y) * h[right] + y * h[right + up]
                               : (1.0 - y) * h[0] + (y - x) * h[up] + x * h[right + up];
-    return sum * (a[most] / N) + ROUNDINGS * reach * a[most];
+    return sum * (a[most] / N);
+}
+
+/* How far roundings may move a point, along a unit of each axis, that is mapped from within `reach`. Not in proportion to the result:
+ * terms may have cancelled each other out. */
+static double slack_under(const pl_affine *to_parent, double reach)
+{
+    double size = 0.0;
+    for (int i = 0; i < 12; i++) size += (i % 4 == 3 ? 1.0 : 2.0 * reach) * fabs(to_parent->m[i]);
+    return ROUNDINGS * size;
 }
 
 /* The support in direction d of the set mapped. */
-static double support_under(const pl_affine *to_parent, const pl_hull *hull, double reach, const double d[3])
+static double support_under(const pl_affine *to_parent, const pl_hull *hull, const double d[3])
 {
     const double *m = to_parent->m;
-    double v[3], move = 0.0, size = 0.0;
-    for (int axis = 0; axis < 3; axis++) {
-        v[axis] = d[0] * m[axis] + d[1] * m[4 + axis] + d[2] * m[8 + axis];
-        move += d[axis] * m[4 * axis + 3];
-        /* Not |v|: its terms may have cancelled each other out. */
-        size += fabs(d[axis]) * (fabs(m[4 * axis + 3]) + reach * (fabs(m[4 * axis]) + fabs(m[4 * axis + 1]) + fabs(m[4 * axis + 2])));
-    }
-    return support_along(hull, reach, v) + move + ROUNDINGS * size;
+    double v[3];
+    for (int axis = 0; axis < 3; axis++) v[axis] = d[0] * m[axis] + d[1] * m[4 + axis] + d[2] * m[8 + axis];
+    return support_along(hull, v) + (d[0] * m[3] + d[1] * m[7] + d[2] * m[11]);
 }
 
 void pl_hull_through(const pl_affine *to_parent, pl_hull *hull)
 {
     const pl_hull below = *hull;
-    const double reach = reach_of(&below);
+    const double slack = N * slack_under(to_parent, reach_of(&below));
     for (int i = 0; i < PL_HULL_CELLS; i++) {
         double d[3];
-        if (direction_of(i, d)) hull->support[i] = support_under(to_parent, &below, reach, d);
+        if (direction_of(i, d)) hull->support[i] = support_under(to_parent, &below, d) + slack;
     }
 }
 
 pl_box pl_hull_box_under(const pl_affine *to_parent, const pl_hull *hull)
 {
-    const double reach = reach_of(hull);
+    const double slack = slack_under(to_parent, reach_of(hull));
     pl_box box;
     for (int axis = 0; axis < 3; axis++) {
         double d[3] = {0.0, 0.0, 0.0};
         d[axis] = -1.0;
-        box.lo[axis] = -support_under(to_parent, hull, reach, d);
+        box.lo[axis] = -support_under(to_parent, hull, d) - slack;
         d[axis] = 1.0;
-        box.hi[axis] = support_under(to_parent, hull, reach, d);
+        box.hi[axis] = support_under(to_parent, hull, d) + slack;
     }
     return box;
 }
@@ -256,9 +261,9 @@ static double support_under_entries(const pl_range_map *map, const pl_hull *belo
     for (int corner = 0; corner < 8; corner++) {
         const double at[3] = {corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1], corner & 4 ? hi[2] : lo[2]};
         const bool again = (corner & 1 && lo[0] == hi[0]) || (corner & 2 && lo[1] == hi[1]) || (corner & 4 && lo[2] == hi[2]);
-        if (!again) largest = fmax(largest, support_along(below, reach, at));
+        if (!again) largest = fmax(largest, support_along(below, at));
     }
-    return largest + hi[3] + ROUNDINGS * size;
+    return largest + hi[3] + 4.0 * ROUNDINGS * size;
 }
 
 void pl_hull_through_range(const pl_range_map *map, pl_hull *hull)
@@ -267,12 +272,15 @@ void pl_hull_through_range(const pl_range_map *map, pl_hull *hull)
     const double reach = reach_of(&below);
     corners c;
     const bool known = corners_of_steps(map, &c);
+    double slack = 0.0;
+    for (int k = 0; known && k < c.count; k++) slack = fmax(slack, N * slack_under(&c.list[k], reach));
+    if (known) slack += 16.0 * ROUNDINGS * N * c.largest * (1.0 + 3.0 * reach);
     for (int i = 0; i < PL_HULL_CELLS; i++) {
         double d[3], sum = -INFINITY;
         if (!direction_of(i, d)) continue;
         if (!known) sum = support_under_entries(map, &below, reach, d);
-        for (int k = 0; known && k < c.count; k++) sum = fmax(sum, support_under(&c.list[k], &below, reach, d));
-        if (known) sum += 16.0 * ROUNDINGS * N * c.largest * (1.0 + 3.0 * reach);
+        for (int k = 0; known && k < c.count; k++) sum = fmax(sum, support_under(&c.list[k], &below, d));
+        sum += slack;
         hull->support[i] = isnan(sum) ? INFINITY : sum;
     }
 }

@@ -176,6 +176,7 @@ static void identity(pl_range_map *map)
     for (int i = 0; i < 12; i++) map->m[i] = pl_range_of(i % 5 == 0 ? 1.0 : 0.0);
     map->stretch = map->inverse_stretch = 1.0;
     map->step_count = 0;
+    memset(map->steps, 0, sizeof map->steps); /* maps are compared byte by byte */
 }
 
 /* Entries of matrices: zeros and ones, of which there are many, stay exact. */
