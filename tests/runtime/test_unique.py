@@ -90,9 +90,13 @@ def test_cut_offs_are_the_same_in_every_accelerator_and_budget(px):
         assert ("accelerator" in options) != (counts["lazy"]["unfolded"] > 0)
 
 
-EMPTY_TWIGS = FOREST[: FOREST.index("Selection Tree {")] + """
+# From above a tree is a thin upright pole; in its own frame that leans, so what is known of a tree reaches to where its twig
+# would be, 3.4 from the pole. There, beyond a second pole, is room in what is known of the place.
+EMPTY_TWIGS = FOREST[: FOREST.index("Selection Tree {")].replace("rotz 360*rand(3);", "roty -20; rotx -5;").replace(
+    "] Tree;", "] Tree + [ trans -8 3 0; scale 0.05 0.05 20 ] cylinder;"
+) + """
 Selection Tree {
-    Tree -> [ rotx 40; roty 35; scale 0.05 0.05 5 ] cylinder + [ x = 0.51 + 0.0001*rand(9); trans 0.3 -0.3 3; scale 0.1 ] Twig(x);
+    Tree -> [ rotx 5; roty 20; scale 0.05 0.05 20 ] cylinder + [ x = 0.51 + 0.0001*rand(9); trans 0.1 -0.05 10.2; scale 0.1 ] Twig(x);
 }
 Selection Twig(x) { if (x > 0.515) Twig -> sphere; }
 """
