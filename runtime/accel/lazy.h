@@ -7,7 +7,7 @@
  *
  * The cache has two halves. States are put into one of them; when it is full the other one is emptied and taken instead. So
  * nothing points at what is gone, as long as no ray stands in both: a ray holds one half at a time, and when that changes
- * it lets go of all states and finds them again by their scopes. A state is a pure function of its key.
+ * it lets go of all states and finds them again by their scopes, or unfolds them again. A state is a pure function of its key.
  *
  *     pl_lazy_half *half = pl_lazy_hold(cache);                                 a ray begins
  *     pl_lazy_state *state = pl_lazy_get(cache, half, unfolder, symbol, scope, …);

@@ -5,6 +5,7 @@
 
 #include "../error.h"
 #include "../random.h"
+#include "../table.h"
 #include "lazy.h"
 
 enum { SMALLEST_BUDGET = 16384, SMALLEST_CHUNK = 4096, LARGEST_CHUNK = 1 << 20, BYTES_A_BUCKET = 1024 };
@@ -32,8 +33,25 @@ struct pl_lazy_cache {
     uint32_t bucket_count;
     size_t limit, chunk_size; /* of a half */
     uint64_t unfolded, evicted;
+    bool keys_repeat;
     atomic_uint_fast64_t found;
 };
+
+/* Whether there is code that maps random keys to fewer. */
+static bool do_keys_repeat(const pl_program *program)
+{
+    for (uint32_t i = 0; i < program->node_count; i++) {
+        const pl_node *node = &program->nodes[i];
+        if (node->kind != PL_NODE_CALCULATE || !node->as.calculate.code) continue;
+        for (const uint8_t *at = program->code + (node->as.calculate.code - 1); *at != PL_OP_END;) {
+            const uint8_t opcode = *at++;
+            if (opcode == PL_OP_VARIANTS) return true;
+            if (pl_op_row_of(opcode)->operand == PL_OPERAND_NONE) continue;
+            while (*at++ & 0x80) continue;
+        }
+    }
+    return false;
+}
 
 size_t pl_lazy_budget(const pl_scene *scene)
 {
@@ -54,6 +72,7 @@ pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_erro
         return NULL;
     }
     cache->scene = scene;
+    cache->keys_repeat = do_keys_repeat(scene->program);
     cache->classes = scene->gates ? scene->gates : pl_classes_create(scene->program, scene->meshes, limit / 4, error);
     bool ok = cache->classes != NULL;
     pthread_mutex_init(&cache->lock, NULL);
@@ -205,6 +224,13 @@ static pl_lazy_state *find(pl_lazy_state *bucket, uint64_t hash, uint32_t symbol
     return NULL;
 }
 
+/* Whether a state has a random key of its own: then it is on one path only, and isn't looked up but found by the item that
+ * enters it. Rays that let go of it unfold it again. */
+static bool is_met_once(const pl_lazy_cache *cache, uint32_t symbol)
+{
+    return !cache->keys_repeat && symbol != UINT32_MAX && cache->scene->program->nodes[symbol].as.symbol.draws;
+}
+
 /* Two threads may unfold the same state: then there are two of it. */
 pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder *unfolder, uint32_t symbol,
                            const uint64_t *scope, uint64_t *work, bool *full, pl_error *error)
@@ -220,9 +246,13 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder
     uint64_t hash = symbol;
     for (uint32_t i = 0; i < words; i++) hash = pl_mix(hash, key[i]);
     pl_lazy_state **bucket = bucket_of(cache, half, hash);
-    pthread_mutex_lock(&cache->lock);
-    pl_lazy_state *state = find(*bucket, hash, symbol, key, words);
-    pthread_mutex_unlock(&cache->lock);
+    const bool once = is_met_once(cache, symbol);
+    pl_lazy_state *state = NULL;
+    if (!once) {
+        pthread_mutex_lock(&cache->lock);
+        state = find(*bucket, hash, symbol, key, words);
+        pthread_mutex_unlock(&cache->lock);
+    }
     if (state) {
         pl_lazy_add_found(cache, 1);
         return state;
@@ -238,8 +268,10 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder
     state = pl_unfolder_write(unfolder, symbol, hash, memory);
     pthread_mutex_lock(&cache->lock);
     cache->unfolded++;
-    state->next = *bucket;
-    *bucket = state;
+    if (!once) {
+        state->next = *bucket;
+        *bucket = state;
+    }
     pthread_mutex_unlock(&cache->lock);
     return state;
 }
