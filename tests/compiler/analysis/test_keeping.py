@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import random
+from functools import partial
 
 import pytest
 from plsys.compiler.analysis import Project, check_whole, keeping
 from plsys.compiler.analysis.checking import Work
 from plsys.compiler.analysis.facts import facts_of
 from plsys.compiler.analysis.whole import Result, Snapshot
+from plsys.compiler.graph import forecast
+from plsys.compiler.reading.memory import Memory
 from plsys.compiler.reading.resolve_rules import Rules
 
 HEAD = """\
@@ -52,6 +55,14 @@ EXCHANGES = [
 ]  # fmt: skip
 
 
+
+
+@pytest.fixture(autouse=True)
+def parts_are_large_and_forecasts_short(monkeypatch):
+    monkeypatch.setattr(keeping, "MANY_BLOCKS", 1)
+    monkeypatch.setattr(forecast, "forecast", partial(forecast.forecast, max_states=300, max_depth=300))
+
+
 # What is said only where all names are known.
 UNSURE = ("unused", "unreachable")
 
@@ -81,8 +92,7 @@ def fresh(text: str) -> list[tuple]:
 
 
 @pytest.mark.parametrize("seed", range(24))
-def test_what_is_kept_says_what_a_fresh_start_says(seed, monkeypatch):
-    monkeypatch.setattr(keeping, "MANY_BLOCKS", 1)
+def test_what_is_kept_says_what_a_fresh_start_says(seed):
     choices, text = random.Random(seed), SCENE
     project, work, before = Project(), Work(), None
     document = project.open(None, text.encode(), name="x")
@@ -111,8 +121,7 @@ def test_what_is_kept_says_what_a_fresh_start_says(seed, monkeypatch):
     (SCENE, "Twig1(n1 + all)", "Forest", "maybe-unassigned"),
     (SCENE.replace("T_turn0 {", "T_turn0 { scale Twice;"), "Redness = 0.5", "Redness = 0", "singular"),
 ], ids=["entry action", "way back", "constant"])  # fmt: skip
-def test_an_edit_is_seen_far_away(scene, old, new, code, monkeypatch):
-    monkeypatch.setattr(keeping, "MANY_BLOCKS", 1)
+def test_an_edit_is_seen_far_away(scene, old, new, code):
     project, work, before = Project(), Work(), None
     document = project.open(None, scene.encode(), name="x")
     shown = project.scene_of(document)
@@ -128,7 +137,6 @@ def test_an_edit_is_seen_far_away(scene, old, new, code, monkeypatch):
 
 
 def test_an_edit_in_a_rule_resolves_that_rule_only(monkeypatch):
-    monkeypatch.setattr(keeping, "MANY_BLOCKS", 1)
     project, work = Project(), Work()
     document = project.open(None, SCENE.encode(), name="x")
     scene = project.scene_of(document)
@@ -141,3 +149,33 @@ def test_an_edit_in_a_rule_resolves_that_rule_only(monkeypatch):
     project.edit(document, at, at + 1, b"1")
     work.run(Snapshot.of(scene, 1, first).request, lambda answer: None)
     assert resolved == ["Tree1"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_checks_that_are_broken_off_go_on_where_they_were(seed, monkeypatch):
+    choices, text = random.Random(seed), SCENE
+    ask = Memory.ask
+
+    def sometimes_asks(memory, *question, given=()):
+        if work.interruption._is_allowed and choices.random() < 0.01:
+            work.interruption.interrupt()
+        return ask(memory, *question, given=given)
+
+    project, work, before = Project(), Work(), None
+    document = project.open(None, text.encode(), name="x")
+    scene = project.scene_of(document)
+    for number in range(6):
+        at, old, new = exchanged(choices, text)
+        text = text[:at] + new + text[at + len(old) :]
+        project.edit(document, at, at + len(old), new.encode())
+        scene.work()
+        before = snapshot = Snapshot.of(scene, number, before)
+        work.take(snapshot.request)
+        with monkeypatch.context() as patch:
+            patch.setattr(Memory, "ask", sometimes_asks)
+            for _ in range(3):
+                work.go_on(lambda answer: Result(snapshot, answer).apply(), lambda: True)
+        if choices.random() < 0.5:
+            work.go_on(lambda answer: Result(snapshot, answer).apply())
+            if not any(each[0] == "error" for each in fresh(text)):
+                assert told(scene, document) == fresh(text)
