@@ -31,11 +31,17 @@ static double cache_bytes(void)
     return CACHE_SHARE * (double)(size > 0 ? size : DEFAULT_CACHE);
 }
 
-/* What is there while fronts are built and gone afterwards: states before they are packed, compositions, hulls. */
+/* What is there while fronts are built and gone afterwards: states before they are packed, compositions. */
 static double building_bytes(const pl_scene *scene, const pl_compositions *compositions)
 {
-    return (double)scene->states.bytes + (double)pl_compositions_bytes(compositions) +
-           (double)pl_front_hulls_bytes(&scene->states);
+    return (double)scene->states.bytes + (double)pl_compositions_bytes(compositions);
+}
+
+/* Hulls are gone before the states are packed, so they take the room of these. */
+static bool hulls_fit(const pl_scene *scene, const pl_front_plan *plan)
+{
+    const double needed = building_bytes(scene, plan->compositions) + plan->estimate + (double)pl_front_hulls_bytes(&scene->states);
+    return scene->options.memory == 0 || needed <= MOST_AT_ONCE * (double)scene->options.memory + SPARE;
 }
 
 /* A plan for what the scene's options ask for: so many items; as much as fits into `memory`; or what pays, as far as the
@@ -271,7 +277,7 @@ static bool build_planned(const pl_scene *scene, const pl_compositions *composit
     pl_front_plan *plan = NULL;
     bool ok = choose(scene, compositions, share, fronts, &plan, error);
     if (ok && !list_fronts(fronts, plan)) ok = pl_fail_memory(error, "building the fronts");
-    if (ok && !scene->states.cuts) plan->hulls = pl_front_hulls_create(plan);
+    if (ok && !scene->states.cuts && hulls_fit(scene, plan)) plan->hulls = pl_front_hulls_create(plan);
     ok = ok && build_fronts(scene, plan, fronts, error);
     for (uint32_t i = 0; ok && i < fronts->count; i++)
         add_to(fronts, &fronts->list[i], &plan->counts[fronts->list[i].state]);
