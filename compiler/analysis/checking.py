@@ -24,7 +24,6 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Any, Callable, Iterator
 
-from ..reading import syntax
 from ..reading.diagnostics import Diagnostic, Diagnostics, PlsysError
 from ..reading.model import Empty, Model, SceneObject
 from ..reading.resolve_names import _identity
@@ -254,26 +253,18 @@ def _check(scene: SceneState, part: Part, order: dict[Block, int], interruption:
 
 def _checked(scene: SceneState, part: Part, order: dict[Block, int]) -> Outcome:
     from ..reading.check import check
-    from ..reading.resolve import resolve
 
     blocks = sorted((*part.blocks, *scene.parts.needed(part)), key=order.__getitem__)
-    diagnostics = Diagnostics()
-    definitions: list[syntax.Definition] = []
-    for block in blocks:
-        facts = facts_of(block)
-        diagnostics.items += facts.syntax
-        definitions += [each for each in facts.file.definitions if not isinstance(each, syntax.Include)]
+    diagnostics, kept = Diagnostics(), part.memory or Kept(None)
     try:
         first = next(iter(scene.blocks.values()))[0]  # the root's: of other files, what nothing uses isn't said
-        start = Span(first, 0, len(first.data))
-        kept = part.memory or Kept()
-        model = resolve(syntax.File(start, tuple(definitions)), diagnostics, meanings=kept.meanings if part.memory else None)
+        model = kept.resolved(blocks, first, order, diagnostics)
         late = [each for each in diagnostics.items if each.code in LATE_CODES]
         before, is_broken = len(diagnostics.items), diagnostics.has_errors
         if not is_broken:
             if not model.objects and scene.objects:
                 # The scene has objects, though this part has none.
-                model.objects.append(SceneObject("", 0, Empty(), start))
+                model.objects.append(SceneObject("", 0, Empty(), Span(first, 0, len(first.data))))
             check(model, diagnostics, kept.answers)
             kept.answers.end_round()
     except (PlsysError, RecursionError):

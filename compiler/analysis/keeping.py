@@ -14,8 +14,13 @@ from dataclasses import dataclass, field
 from typing import Iterable, Iterator
 
 from ..reading import syntax
+from ..reading.diagnostics import Diagnostic, Diagnostics
 from ..reading.meanings import Meanings
 from ..reading.memory import Memory
+from ..reading.model import Model
+from ..reading.resolve import Resolver
+from ..reading.resolve_again import resolve_again
+from ..reading.source import Source, Span
 from .facts import facts_of
 from .parts import Part, Parts, role_of
 from .text import Block
@@ -26,8 +31,69 @@ MANY_BLOCKS = 100
 
 @dataclass
 class Kept:
-    meanings: Meanings = field(default_factory=Meanings)
+    """``meanings`` and ``answers`` of the blocks that no edit touched. After an edit within definitions even the resolver
+    and its model are kept, and what is ``_due`` is exchanged there (reading/resolve_again.py)."""
+
+    meanings: Meanings | None = field(default_factory=Meanings)  # None: nothing is kept of what was resolved
     answers: Memory = field(default_factory=Memory)
+    _resolver: Resolver | None = None
+    _gone: set[Block] = field(default_factory=set)  # what the resolver has seen of them doesn't hold
+    _due: set[Block] = field(default_factory=set)  # what it has to see instead
+    _syntax: dict[Block, list[Diagnostic]] = field(default_factory=dict)
+
+    def forget(self, removed: list[Block], added: list[Block], touched: list[Block]) -> None:
+        """Blocks went and came, which touched others."""
+        for block in (*removed, *touched):
+            self.meanings.forget(block)
+        if self._resolver is not None:
+            self._gone.update(removed, touched)
+            self._due.update(added, touched)
+            self._due.difference_update(removed)
+
+    def let_go(self) -> None:
+        """Forget what was resolved, but for meanings."""
+        if self._resolver is not None:
+            self._resolver.close()
+        self._resolver = None
+        self._gone, self._due = set(), set()
+
+    def resolved(self, blocks: list[Block], root: Block, order: dict[Block, int], found: Diagnostics) -> Model:
+        """The model of ``blocks``; messages of reading and resolving them are added to those ``found``."""
+        resolver, gone, due = self._resolver, self._gone, self._due
+        self._resolver, self._gone, self._due = None, set(), set()
+        try:
+            if resolver is None or not self._exchange(resolver, gone, [block for block in blocks if block in due], order):
+                if resolver is not None:
+                    resolver.close()
+                resolver = self._resolve(blocks, root)
+            model, said = resolver.model, resolver.diagnostics.items
+            model.source = root
+            found.items += [each for several in self._syntax.values() for each in several]
+            if self.meanings is not None and not said and not found.has_errors and model.objects:
+                self._resolver = resolver
+            found.items += said
+            return model
+        finally:
+            if resolver is not None and self._resolver is None:
+                resolver.close()
+
+    def _exchange(self, resolver: Resolver, gone: set[Block], due: list[Block], order: dict[Block, int]) -> bool:
+        names = frozenset().union(*(role_of(block).names for block in due))
+        if not resolve_again(resolver, [facts_of(block).file for block in due], gone, names, order):
+            return False
+        for block in gone:
+            self._syntax.pop(block, None)
+        self._syntax.update((block, facts_of(block).syntax) for block in due)
+        return True
+
+    def _resolve(self, blocks: list[Block], root: Block) -> Resolver:
+        self._syntax = {block: facts_of(block).syntax for block in blocks if facts_of(block).syntax}
+        every = (each for block in blocks for each in facts_of(block).file.definitions)
+        definitions = tuple(each for each in every if not isinstance(each, syntax.Include))
+        resolver = Resolver(syntax.File(Span(root, 0, len(root.data)), definitions), Diagnostics(), {}, None, Source.read)
+        resolver.names.meanings = self.meanings
+        resolver.run()
+        return resolver
 
 
 def hand_over(before: Iterable[Part], parts: Parts, removed: list[Block], added: list[Block]) -> None:
@@ -37,11 +103,13 @@ def hand_over(before: Iterable[Part], parts: Parts, removed: list[Block], added:
     if old:
         every = any(role_of(block).kind == "general" for block in (*removed, *added))
         touched = [] if every else list(_touched(parts, removed, added))
+        are_exchanged = not every and _are_exchanged(removed, added)
         for part in old:
             if every:
                 part.memory.meanings.forget_all()
-            for block in (*removed, *touched):
-                part.memory.meanings.forget(block)
+            if not are_exchanged:
+                part.memory.let_go()
+            part.memory.forget(removed, added, touched)
     now = list(parts)
     gone = [part for part in old if part not in now]
     for part in now:
@@ -50,6 +118,18 @@ def hand_over(before: Iterable[Part], parts: Parts, removed: list[Block], added:
             heir = next((other for other in gone if not blocks.isdisjoint(other.blocks)), None)
             part.memory = heir.memory if heir is not None else Kept()
             gone = [other for other in gone if other is not heir]
+    for part in gone:
+        part.memory.let_go()
+
+
+def _are_exchanged(removed: list[Block], added: list[Block]) -> bool:
+    """Whether the scene's blocks are as before but for what stands within definitions."""
+    return len(removed) == len(added) and all(
+        role_of(old) == role_of(new)
+        and not (role_of(old).includes or facts_of(old).blocks or facts_of(new).blocks)
+        and [each.name for each in facts_of(old).definitions] == [each.name for each in facts_of(new).definitions]
+        for old, new in zip(removed, added)
+    )
 
 
 def _touched(parts: Parts, removed: list[Block], added: list[Block]) -> Iterator[Block]:

@@ -83,10 +83,6 @@ class BlockResolver(Resolver):
                 return 0
         return super().load_mesh(call)
 
-    def close(self) -> None:
-        """Let go of the parts, which refer to this: nothing is left to the search for garbage in cycles."""
-        self.__dict__.clear()
-
     def run_on(self, facts: Facts) -> None:
         """Resolve what ``facts``' block holds."""
         names = self.names

@@ -109,6 +109,11 @@ class Resolver:
             self.names.meanings.edges = self.terms.edges()
         return model
 
+    def close(self) -> None:
+        """Let go of the parts, which refer to each other: nothing is left to the search for garbage in cycles."""
+        self.names.__dict__.clear()
+        self.__dict__.clear()
+
     # --- settings and the seed
 
     def resolve_settings(self) -> None:

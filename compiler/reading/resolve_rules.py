@@ -33,15 +33,22 @@ class Rules:
     def __init__(self, names: Names, expressions: Expressions, terms: Terms) -> None:
         self.names, self.expressions, self.terms = names, expressions, terms
         self.rules = 0
+        self._firsts: dict[str, int] = {}  # the numbers of the Selections' first rules
         self._counted: dict[int, tuple[int, Production]] = {}
 
     # --- Selections
 
     def selection(self, node: syntax.Selection) -> Symbol:
         """The symbol that ``node`` defines. Problems are reported, and what has one becomes Empty."""
-        first = self.rules
+        first = self._firsts[node.name.name] = self.rules
         firsts = [self._numbered(production) for production in node.productions]
         return self.names.known(node, lambda: self._selection(node, firsts), first)
+
+    def renewed(self, node: syntax.Selection) -> Symbol:
+        """As ``selection``, of one that has as many rules as the Selection of this name had."""
+        self.rules = self._firsts[node.name.name]
+        self._counted.clear()
+        return self.selection(node)
 
     def _selection(self, node: syntax.Selection, firsts: list[int]) -> Symbol:
         rest: Production = Empty(node.span)
@@ -76,7 +83,7 @@ class Rules:
     def _numbered(self, production: syntax.Production) -> int:
         """The number of the first of the production's rules; the others follow in text order."""
         first = self.rules
-        self.rules += _rule_count(production)
+        self.rules += rule_count(production)
         return first
 
     def _production(
@@ -91,7 +98,7 @@ class Rules:
         then = self._production(node.then, owner, rest, number)
         otherwise = rest
         if node.otherwise is not None:
-            otherwise = self._production(node.otherwise, owner, rest, number + _rule_count(node.then))
+            otherwise = self._production(node.otherwise, owner, rest, number + rule_count(node.then))
         return Branch(test, then, otherwise, node.span)
 
     def _rule(self, node: syntax.Rule, owner: syntax.Selection, number: int) -> Production:
@@ -155,9 +162,10 @@ def _always_applies(production: syntax.Production | None) -> bool:
     return production is not None
 
 
-def _rule_count(production: syntax.Production | None) -> int:
+def rule_count(production: syntax.Production | None) -> int:
+    """How many right-hand sides a production has, in all its branches."""
     if isinstance(production, syntax.If):
-        return _rule_count(production.then) + _rule_count(production.otherwise)
+        return rule_count(production.then) + rule_count(production.otherwise)
     return len(production.alternatives) if production is not None else 0
 
 

@@ -193,6 +193,10 @@ class Terms:
                 self.names.record = outer
         return self._entry_actions[name]
 
+    def forget(self, name: str) -> None:
+        """Let the entry action of a Selection be made anew."""
+        self._entry_actions.pop(name, None)
+
     def _entry_action(self, node: syntax.Selection) -> tuple[Operator, ...]:
         assert node.entry is not None
         *prefixes, last = node.entry.items
@@ -236,12 +240,15 @@ class Terms:
     def edges(self) -> dict[str, set[str]]:
         """The Selections that each one's productions end with."""
         if self._all_edges is None:
-            meanings, self._all_edges = self.names.meanings, {}
-            for name, entry in self.names.entries.items():
-                if isinstance(node := entry.node, syntax.Selection):
-                    named = meanings.once(node, "ends", lambda: _ends(node)) if meanings is not None else _ends(node)
-                    self._all_edges[name] = {end.name for end in named if self._is(end, "selection")}
+            selections = ((name, entry.node) for name, entry in self.names.entries.items())
+            self._all_edges = {name: self.ends_of(node) for name, node in selections if isinstance(node, syntax.Selection)}
         return self._all_edges
+
+    def ends_of(self, node: syntax.Selection) -> set[str]:
+        """The Selections that the productions of one end with."""
+        meanings = self.names.meanings
+        named = meanings.once(node, "ends", lambda: _ends(node)) if meanings is not None else _ends(node)
+        return {end.name for end in named if self._is(end, "selection")}
 
     def _is(self, name: syntax.Name, kind: str) -> bool:
         entry = self.names.entries.get(name.name)

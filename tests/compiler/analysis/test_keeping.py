@@ -12,6 +12,7 @@ from plsys.compiler.analysis.facts import facts_of
 from plsys.compiler.analysis.whole import Result, Snapshot
 from plsys.compiler.graph import forecast
 from plsys.compiler.reading.memory import Memory
+from plsys.compiler.reading.resolve_names import Names
 from plsys.compiler.reading.resolve_rules import Rules
 
 HEAD = """\
@@ -54,7 +55,17 @@ EXCHANGES = [
     ("cylinder", "mesh(\"no.obj\")"), ("else Tree2 ->", "Tree2 ->"), ("T_up { ", "T_up { // plain\n"), ("\nSelection Twig0", "\nSelection Tree0"),
 ]  # fmt: skip
 
-
+# Most of these leave all names and the number of rules as they are, and all can be undone.
+SPARE = SCENE.replace("--n1;", "--n1; spare = 1;").replace("--n2;", "--n2; spare = n2; all = 2;")
+WITHIN = [
+    ("n0 = order", "n0 = order/0"), ("n1 = order", "\n  n1 = 2 + order"), ("n1 > 0", "n1 > 12"), ("n2 > 0", "n2 == 0"), ("trans 0 0 1", "scale 0 1 1"),
+    ("--n1;", "++n1;"), ("spare = 1", "spare = pi/2"), ("spare = n2; all = 2", "all = n2; spare = 2"), ("rotz n0", "rotz n0/0"), ("rotz n1", "rotz sqrt(-1)*n1"),
+    ("scale w0", "scale w0*0"), ("--n2;", "n2 = n2;"), ("disc", "sphere"), ("cylinder", "cone"), ("Tree0 + T_up Tree1", "T_up Tree1 + Tree0"),
+    ("Twice:", "0*Twice:"), ("1: [", "-1: ["), ("n2/10", "n2/0"), ("C_less0 T_up", "T_up C_less0"), ("Calculation C_init2", "\n// new\nCalculation C_init2"),
+    ("scale w1", "scale w1; spare = 3"), ("Tree1 + Tree2", "Tree1 + Tree1"), ("else Tree2 ->", "else if (n2 < 9) Tree2 ->"), ("n0 > 0", "n1 > 0"),
+    ("(n1 + all)", "(all + n1, 2)"), ("C_init1 Tree1;", "C_init1 C_init1 Tree1;"), ("T_turn2 box", "T_turn2 box + box"), ("sphere +", "sphere"),
+    ("rotz n2", "rotz"), ("Calculation C_less1", "Transformation C_less1"), ("Redness = 0.5", "Redness = 0"), ("sky <0, 0, 1>", "sky <0, 1, 1>"),
+]  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
@@ -113,6 +124,55 @@ def test_what_is_kept_says_what_a_fresh_start_says(seed):
             if any(severity == "error" for severity, *_ in expected):
                 found, expected = ([each for each in every if each[1] not in UNSURE] for every in (found, expected))
             assert found == expected
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_definitions_are_exchanged_as_if_all_were_resolved(seed):
+    choices, text = random.Random(seed), SPARE
+    project, work, before = Project(), Work(), None
+    document = project.open(None, text.encode(), name="x")
+    scene = project.scene_of(document)
+    done: list[tuple[str, str]] = []
+    for number in range(16):
+        for _ in range(choices.choice((1, 1, 1, 2))):
+            if done and choices.random() < 0.6:
+                new, old = done.pop()
+            else:
+                old, new = choices.choice([pair for pair in WITHIN if text.count(pair[0]) > text.count(pair[1]) * (pair[0] in pair[1])])
+                done.append((old, new))
+            at = text.find(old)
+            if at < 0:
+                continue  # another edit is in its place
+            text = text[:at] + new + text[at + len(old) :]
+            project.edit(document, at, at + len(old), new.encode())
+        scene.work()
+        before = snapshot = Snapshot.of(scene, number, before)
+        work.take(snapshot.request)
+        if choices.random() < 0.2:
+            continue  # the next edit came first
+        work.go_on(lambda answer: Result(snapshot, answer).apply())
+        found, expected = told(scene, document), fresh(text)
+        if any(severity == "error" for severity, *_ in expected):
+            found, expected = ([each for each in every if each[1] not in UNSURE] for every in (found, expected))
+        assert found == expected
+
+
+def test_an_edit_within_a_definition_leaves_the_namespace_alone(monkeypatch):
+    project, work = Project(), Work()
+    document = project.open(None, SCENE.encode(), name="x")
+    scene = project.scene_of(document)
+    snapshot = Snapshot.of(scene, 0)
+    work.run(snapshot.request, lambda answer: None)
+    gathered: list[object] = []
+    gather = Names.gather
+    monkeypatch.setattr(Names, "gather", lambda self, file: gathered.append(file) or gather(self, file))
+    for old, new, is_within in (("n1 > 0", "n1 > 2", True), ("n2 = order", "n2 = 4 + order", True), ("trans 0 0 1", "trans 0 0 2", True), ("disc |", "disc | 2: box |", False)):
+        at = document.text.data.index(old.encode())
+        project.edit(document, at, at + len(old), new.encode())
+        scene.work()
+        snapshot = Snapshot.of(scene, 0, snapshot)
+        work.run(snapshot.request, lambda answer: None)
+        assert bool(gathered) is not is_within
 
 
 @pytest.mark.parametrize("scene, old, new, code", [
