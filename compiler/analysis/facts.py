@@ -58,7 +58,7 @@ class Facts:
     """See the module. They stay the same object while letters are typed into the block's names (retouch.py). ``text`` is what was parsed; ``definitions`` are those that
     name something; ``blocks`` are scene blocks; ``assigned`` are the names that get values, in text order; ``ghosts`` are
     definitions of an earlier text that this one has lost to a syntax error; ``spans`` are all places in ``file``, if
-    there are no messages in ``syntax``."""
+    there are no messages in ``syntax``; ``right`` is the last text that nothing was wrong with, and when that was (Namespace.now)."""
 
     text: bytes
     _tree: Tree | None
@@ -66,6 +66,7 @@ class Facts:
     spans: list[Span] = field(repr=False)
     syntax: list[Diagnostic]
     ghosts: dict[str, Definition] = field(default_factory=dict)
+    right: tuple[bytes, int] | None = None
 
     @property
     def block(self) -> Block:

@@ -48,6 +48,8 @@ class Namespace:
         self._signatures: dict[str, object] = {}
         self._touched: dict[str, None] = {}  # names that may mean something else since the last refresh
         self._names: dict[str, NameIndex] = {}  # by kind, for names that are like a wrong one
+        self.now = 0  # counts refreshes
+        self._changed: dict[str, int] = {}  # in which refresh a name came to mean something else
 
     # --- following blocks
 
@@ -99,11 +101,13 @@ class Namespace:
         """Bring the entries up to date; the blocks that use a name whose signature changed, or a constant made of
         those. None in between, where a pause can be made."""
         queue = []
+        self.now += 1
         while self._touched:
             name = next(iter(self._touched))
             del self._touched[name]
             if self._refresh(name):
                 queue.append(name)
+                self._changed[name] = self.now
             yield None
         self._touched = {}  # what once was large takes long to find the first of
         seen = set(queue)
@@ -115,6 +119,7 @@ class Namespace:
                     if entry is not None and entry.kind in _VALUES and definition.name not in seen:
                         seen.add(definition.name)
                         queue.append(definition.name)
+                        self._changed[definition.name] = self.now
 
     def _refresh(self, name: str) -> bool:
         """Bring the entry of ``name`` up to date; whether its signature changed."""
@@ -169,6 +174,11 @@ class Namespace:
         return entry
 
     # --- asking
+
+    def are_as(self, facts: Facts, moment: int) -> bool:
+        """Whether all names in ``facts`` mean what they did when ``now`` was ``moment``."""
+        changed = self._changed
+        return all(changed.get(name.name, 0) <= moment for name in facts.names)
 
     def nearest(self, name: str, kinds: tuple[str, ...] | None) -> str:
         """As Names.nearest of the compiler."""

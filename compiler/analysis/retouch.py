@@ -79,7 +79,7 @@ def retouch(old: Block, new: Block, touch: Touch) -> Span:
     """Give ``new`` the facts of ``old``, which are then ``old``'s no more; the place of the name that has changed."""
     facts = old.__dict__.pop("facts")
     name = facts.names[touch.index]
-    _move(facts, new, name.end, touch.by)
+    move(facts, new, name.end, touch.by)
     _rename(facts, touch)
     facts.retouched()
     new.__dict__.update(facts=facts, before=None)
@@ -103,7 +103,7 @@ def _names_its_rules(facts: Facts, start: int) -> bool:
     )
 
 
-def _move(facts: Facts, block: Block, end: int, by: int) -> None:
+def move(facts: Facts, block: Block, end: int, by: int) -> None:
     """Let all places be those of ``block``, which has ``by`` bytes more before the byte that was at ``end``. The one place
     where spans change: nobody else has them but messages and values that are made anew."""
     for span in facts.spans:

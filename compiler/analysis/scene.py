@@ -27,6 +27,7 @@ from ..reading.resolve_names import ARTICLES, Names, _identity
 from ..reading.source import Source, Span
 from .deadline import Deadline
 from .document import Document, Meaning, Message, Place
+from .earlier import Earlier
 from .facts import Definition, drop_facts, facts_of, keep_lost
 from .namespace import Namespace
 from .parts import role_of
@@ -59,6 +60,7 @@ class Scene:
         self.insights: dict[Block, list] = {}  # what they found to show beside the text: see insights.py
         self.is_opening = False  # names aren't known yet: much of a file was never read
         self._pending = Pending()
+        self._earlier = Earlier()
         self._reading: Iterator[None] | None = None
         self._messages: dict[Block, list[Diagnostic]] = {}  # of resolving
         self._syntax: dict[Block, list[Diagnostic]] = {}
@@ -130,12 +132,18 @@ class Scene:
             if self._retouch(change):
                 yield
                 continue
+            is_alone = all(len(each.scenes) == 1 for each in self.documents)
             if change.removed:
                 for block in change.added:
-                    facts_of(block)
+                    if not is_alone or not self._earlier.take(block):
+                        facts_of(block)
                     yield
                 keep_lost(change)
+            is_lent = any(facts_of(block).ghosts for block in change.added) if change.removed else True
             for block in change.removed:
+                if is_alone and not is_lent:
+                    self._note_right(block)
+                    self._earlier.keep(block)
                 self._forget(block)
                 self._names.forget(facts_of(block))
                 removed_includes |= b"include" in block.data and bool(facts_of(block).includes)
@@ -147,7 +155,8 @@ class Scene:
                 self._names.learn(facts_of(block))
                 if waiting is self._opened:
                     role_of(block)  # the whole-file checks ask for it, of all blocks at once
-                waiting[block] = None
+                if not self._is_right(block):
+                    waiting[block] = None
                 yield
             if removed_includes or any(facts_of(block).includes for block in change.added if b"include" in block.data):
                 self._find_files()
@@ -172,6 +181,7 @@ class Scene:
         was_right = not any(old in table for table in (self._edited, self._dirty, self._opened)) and all(
             name.start <= each.span.start and each.span.end <= name.end for each in self._messages.get(old, ())
         )
+        self._note_right(old)
         self._forget(old)
         if not reads:
             self._names.forget(facts)
@@ -181,8 +191,20 @@ class Scene:
         else:
             self._names.learn(facts)
         self._learn(new)
-        self._edited[new] = place if was_right else None
+        if not self._is_right(new):
+            self._edited[new] = place if was_right else None
         return True
+
+    def _note_right(self, block: Block) -> None:
+        """Note with the facts of a block that goes if all in it is known to be right."""
+        waiting = self._edited, self._dirty, self._opened
+        if not self._messages.get(block) and not any(block in table for table in waiting):
+            facts_of(block).right = block.data, self._names.now
+
+    def _is_right(self, block: Block) -> bool:
+        """Whether an earlier block with the same text was right, and all names in it mean the same."""
+        facts = facts_of(block)
+        return facts.right is not None and facts.right[0] == block.data and self._names.are_as(facts, facts.right[1])
 
     def _forget(self, block: Block) -> None:
         waiting = self._edited, self._dirty, self._opened
