@@ -7,7 +7,7 @@ Example::
 
     namespace.forget(old)
     namespace.learn(new)
-    for block in namespace.refresh(): …         # uses a name that means something else now
+    for found in namespace.refresh(): …         # (facts, name): they use it, and it means something else now
 """
 
 from __future__ import annotations
@@ -97,9 +97,9 @@ class Namespace:
     def is_fresh(self) -> bool:
         return not self._touched
 
-    def refresh(self) -> Iterator[Block | None]:
-        """Bring the entries up to date; the blocks that use a name whose signature changed, or a constant made of
-        those. None in between, where a pause can be made."""
+    def refresh(self) -> Iterator[tuple[Facts, str] | None]:
+        """Bring the entries up to date; who uses a name whose signature changed, or a constant made of those, and
+        which name. None in between, where a pause can be made."""
         queue = []
         self.now += 1
         while self._touched:
@@ -112,8 +112,9 @@ class Namespace:
         self._touched = {}  # what once was large takes long to find the first of
         seen = set(queue)
         while queue:
-            for facts in list(self.users.get(queue.pop(), ())):
-                yield facts.block
+            name = queue.pop()
+            for facts in list(self.users.get(name, ())):
+                yield facts, name
                 for definition in facts.definitions:
                     entry = self.renew(definition)
                     if entry is not None and entry.kind in _VALUES and definition.name not in seen:

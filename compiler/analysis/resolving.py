@@ -13,7 +13,7 @@ from typing import Callable, Iterable
 
 from ..reading import syntax
 from ..reading.diagnostics import Diagnostic, Diagnostics, Note
-from ..reading.model import Empty
+from ..reading.model import Empty, Operand
 from ..reading.resolve import Resolver
 from ..reading.resolve_names import Entry
 from ..reading.source import Source, Span
@@ -47,26 +47,44 @@ class Router(Diagnostics):
 class BlockResolver(Resolver):
     """Resolves in the namespace ``entries``. It is made anew for each block, so that what it remembers of one doesn't
     outlive it; values of constants stay in the entries. ``nearest`` finds names that are like a wrong one faster than
-    by comparing all of them. Terms of rules that don't touch ``only`` are known to be right and left out."""
+    by comparing all of them. Where ``places`` are given, rules and terms with none of them in it are known to be right
+    and left out."""
 
     def __init__(
         self, block: Source, diagnostics: Diagnostics, entries: dict[str, Entry], nearest: Nearest | None = None,
-        only: Span | None = None,
+        places: list[Span] | None = None,
     ) -> None:  # fmt: skip
         super().__init__(syntax.File(Span(block, 0, 0), ()), diagnostics, {}, 0.0, Source.read)
         self.names.entries = entries
         # Which entry actions run where decides no message, and the closure of all references costs too much per key.
         self.terms.reached = lambda name: frozenset()  # type: ignore[method-assign]
-        if only is not None:
-            term = self.terms.term
-            self.terms.term = (  # type: ignore[method-assign]
-                lambda node, owner: term(node, owner)
-                if node.span.start <= only.start and only.end <= node.span.end
-                else Empty(node.span)
-            )
+        if places is not None:
+            self._leave_out(places)
         if nearest is not None:
             self._nearest, self._hints = nearest, {}
             self.names.nearest = self._hint  # type: ignore[method-assign]
+
+    def _leave_out(self, places: list[Span]) -> None:
+        production, term = self.rules._production, self.terms.term
+
+        def is_right(node: syntax.Node) -> bool:
+            return not any(node.span.start <= place.start and place.end <= node.span.end for place in places)
+
+        def whole(node: syntax.Term, owner: str) -> Operand:
+            # The first problem of a term hides others, so that all of it is looked at.
+            self.terms.term = term  # type: ignore[method-assign]
+            try:
+                return term(node, owner)
+            finally:
+                self.terms.term = touched  # type: ignore[method-assign]
+
+        def touched(node: syntax.Term, owner: str) -> Operand:
+            return Empty(node.span) if is_right(node) else whole(node, owner)
+
+        self.terms.term = touched  # type: ignore[method-assign]
+        self.rules._production = (  # type: ignore[method-assign]
+            lambda node, *rest: Empty(node.span) if is_right(node) else production(node, *rest)
+        )
 
     def _hint(self, name: str, kinds: tuple[str, ...] | None) -> str:
         """A wrong name that stands in several places of a block is compared with others once."""

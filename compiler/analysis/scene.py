@@ -28,7 +28,7 @@ from ..reading.source import Source, Span
 from .deadline import Deadline
 from .document import Document, Meaning, Message, Place
 from .earlier import Earlier
-from .facts import Definition, drop_facts, facts_of, keep_lost
+from .facts import Definition, Facts, drop_facts, facts_of, keep_lost
 from .namespace import Namespace
 from .parts import role_of
 from .pending import Pending
@@ -65,9 +65,9 @@ class Scene:
         self._messages: dict[Block, list[Diagnostic]] = {}  # of resolving
         self._syntax: dict[Block, list[Diagnostic]] = {}
         self._ignoring: dict[Block, None] = {}  # blocks with `plsys-ignore` comments
-        # Blocks to be resolved: the last one first. A place is all that has changed, where the rest is right.
-        self._edited: dict[Block, Span | None] = {}
-        self._dirty: dict[Block, None] = {}  # then those that use what was edited
+        # Blocks to be resolved: the last one first. Places are all that has changed, where the rest is right.
+        self._edited: dict[Block, list[Span] | None] = {}
+        self._dirty: dict[Block, list[Span] | None] = {}  # then those that use what was edited
         self._opened: dict[Block, None] = {}  # and then those of a file that was opened, from its start
         self._router = Router(self._messages)
         self._include_messages: dict[Block, list[Diagnostic]] = {}
@@ -92,18 +92,18 @@ class Scene:
         if not self.read(deadline):
             return False
         while self._edited or self._dirty or self._opened:
-            only = None
+            places = None
             if self._edited:
-                block, only = self._edited.popitem()
+                block, places = self._edited.popitem()
             elif self._dirty:
-                block = next(iter(self._dirty))
+                block, places = next(iter(self._dirty.items()))
             elif had_edits and deadline is not None:
                 return False  # what is known about the edit needs not wait
             else:
                 block = next(iter(self._opened))
             self._dirty.pop(block, None)
             self._opened.pop(block, None)
-            self._resolve(block, only)
+            self._resolve(block, places)
             if deadline is not None and deadline.has_passed():
                 return self.is_current
         return True
@@ -160,12 +160,29 @@ class Scene:
                 yield
             if removed_includes or any(facts_of(block).includes for block in change.added if b"include" in block.data):
                 self._find_files()
-        for block in self._names.refresh():
-            if block in self._edited:
-                self._edited[block] = None
-            elif block is not None and block not in self._opened:
-                self._dirty[block] = None
+        for found in self._names.refresh():
+            if found is not None:
+                self._note_change(*found)
             yield
+
+    def _note_change(self, facts: Facts, name: str) -> None:
+        """``name``, which is in ``facts``, means something else now."""
+        block = facts.block
+        if block in self._opened:
+            return
+        places = [each.node.span for each in facts.names if each.name == name]
+        waiting = self._edited if block in self._edited else self._dirty
+        if block not in waiting:
+            waiting[block] = places if self._is_right_but_at(block, places) else None
+        elif (known := waiting[block]) is not None:
+            known += places
+
+    def _is_right_but_at(self, block: Block, places: list[Span]) -> bool:
+        """Whether nothing is known to be wrong with ``block`` but what is in ``places``."""
+        return all(
+            any(place.start <= each.span.start and each.span.end <= place.end for place in places)
+            for each in self._messages.get(block, ())
+        )
 
     def _retouch(self, change: Change) -> bool:
         """Whether all that was typed is letters of a name, which has been read then."""
@@ -178,9 +195,8 @@ class Scene:
         facts, name = facts_of(old), facts_of(old).names[touch.index]
         reads = name.role in ("read", "target")
         # Whether all else in the block is known to be right.
-        was_right = not any(old in table for table in (self._edited, self._dirty, self._opened)) and all(
-            name.start <= each.span.start and each.span.end <= name.end for each in self._messages.get(old, ())
-        )
+        waiting = self._edited, self._dirty, self._opened
+        was_right = not any(old in table for table in waiting) and self._is_right_but_at(old, [name.node.span])
         self._note_right(old)
         self._forget(old)
         if not reads:
@@ -192,7 +208,7 @@ class Scene:
             self._names.learn(facts)
         self._learn(new)
         if not self._is_right(new):
-            self._edited[new] = place if was_right else None
+            self._edited[new] = [place] if was_right else None
         return True
 
     def _note_right(self, block: Block) -> None:
@@ -229,7 +245,7 @@ class Scene:
                 return i, document.text.order[block], definition.node.span.start
         return len(self.documents), 0, 0
 
-    def _resolve(self, block: Block, only: Span | None = None) -> None:
+    def _resolve(self, block: Block, places: list[Span] | None = None) -> None:
         self._messages.pop(block, None)
         facts = facts_of(block)
         if facts.is_broken:
@@ -237,7 +253,7 @@ class Scene:
         for definition in facts.definitions:
             # Another block that uses it may have been first, and its messages went with the old ones.
             self._names.renew(definition)
-        resolver = BlockResolver(block, self._router, self.entries, self._names.nearest, only)
+        resolver = BlockResolver(block, self._router, self.entries, self._names.nearest, places)
         try:
             resolver.run_on(facts)
         except RecursionError:

@@ -25,14 +25,17 @@ class NameIndex:
     """Distinct names, in the order of their heads and of their tails (which are reversed)."""
 
     def __init__(self, names: Iterable[str] = ()) -> None:
-        self.heads = sorted(set(names))
+        self.names = set(names)
+        self.heads = sorted(self.names)
         self.tails = sorted(name[::-1] for name in self.heads)
 
     def add(self, name: str) -> None:
+        self.names.add(name)
         insort(self.heads, name)
         insort(self.tails, name[::-1])
 
     def remove(self, name: str) -> None:
+        self.names.remove(name)
         del self.heads[bisect_left(self.heads, name)]
         del self.tails[bisect_left(self.tails, name[::-1])]
 
@@ -53,6 +56,8 @@ def nearest_of(name: str, indexes: Sequence[NameIndex]) -> str:
     found.update(other[::-1] for other in _neighbours(name[::-1], [index.tails for index in indexes]))
     if (slip := _a_letter_off(name, found)) is not None:
         return f"did you mean '{slip}'?"
+    if (slip := _without_a_letter(name, indexes)) and all(other.casefold() != name.casefold() for other in found):
+        return f"did you mean '{slip}'?"
     return _hint(name, sorted(found, key=lambda other: (-_alike(name, other), other))[:LIKELIEST])
 
 
@@ -67,6 +72,13 @@ def _a_letter_off(name: str, names: Iterable[str]) -> str | None:
         elif not more and other.casefold() == name.casefold():
             return None
     return max(slips, key=lambda other: (len(other), other), default=None) if size > 2 else None
+
+
+def _without_a_letter(name: str, indexes: Sequence[NameIndex]) -> str | None:
+    """What ``name`` of three letters or more is with a letter too many in the middle of names that differ by little, such
+    as numbered ones: then the name that was meant is a neighbour in neither order."""
+    meant = (name[:i] + name[i + 1 :] for i in range(len(name)))
+    return max((other for other in meant if any(other in index.names for index in indexes)), default=None) if len(name) > 2 else None
 
 
 def _has_one_more(one: str, other: str) -> bool:

@@ -275,8 +275,8 @@ class Names:
             raise Problem("wrong-kind", name.span, message, self.nearest(name.name, kinds), (note,))
         return entry
 
-    def unknown(self, name: syntax.Name, kinds: tuple[str, ...], wanted: str) -> Problem:
-        """What to say of a name that no definition of the scene has."""
+    def unknown(self, name: syntax.Name, kinds: tuple[str, ...], wanted: str, hint: str = "") -> Problem:
+        """What to say of a name that no definition of the scene has; ``hint`` where one is known."""
         if taken := vocabulary.kind_of(name.name):
             message = f"'{name.name}' is {ARTICLES[taken]}, not {wanted}"
             hint = (
@@ -289,7 +289,7 @@ class Names:
             return unsupported(name)
         if (found := truth(name, wanted)) is not None and "constant" in kinds:
             return found
-        hint = synonym(name.name, kinds) or self.nearest(name.name, kinds) or self.nearest(name.name, None)
+        hint = hint or synonym(name.name, kinds) or self.nearest(name.name, kinds) or self.nearest(name.name, None)
         return Problem(
             "unknown-name", name.span, f"unknown name '{name.name}': {wanted} is needed here", hint
         )

@@ -146,8 +146,8 @@ class Operators:
             if entry.kind == "selection":
                 hint = f"what {name.name} produces is joined by '+': {name.name} + …"
             return Problem("wrong-kind", name.span, message, hint)
-        problem = self.names.unknown(name, (), "an operation")
         ours = synonym(name.name, ("operation",)) or nearest(name.name, vocabulary.OPERATIONS)
+        problem = self.names.unknown(name, (), "an operation", ours)
         problem.hint = ours or problem.hint or f"operations are {' '.join(vocabulary.OPERATIONS)}"
         return problem
 
