@@ -38,42 +38,42 @@ _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 _MALFORMED: tuple[tuple[re.Pattern[str], str, str, Callable[[re.Match[str]], str] | None], ...] = (
     (
         re.compile(r"\.\d+([eE]\d+)?"),
-        r"'\g<0>' lacks a digit before the point",
+        "'{0}' lacks a digit before the point",
         "",
         lambda match: f"0{match[0]}",
     ),
     (
         re.compile(r"(\d+)\.([eE]\d+)?"),
-        r"'\g<0>' lacks a digit after the point",
+        "'{0}' lacks a digit after the point",
         "",
         lambda match: f"{match[1]}.0{match[2] or ''}",
     ),
     (
         re.compile(r"0[xX]([0-9a-fA-F]{1,16})"),
-        r"'\g<0>' isn't written in tens",
+        "'{0}' isn't written in tens",
         "",
         lambda match: str(int(match[1], 16)),
     ),
     (
         re.compile(r"\d+(_\d+)+(\.\d+)?"),
-        "'_' can't stand in the number \\g<0>",
+        "'_' can't stand in the number {0}",
         "",
         lambda match: match[0].replace("_", ""),
     ),
     (
         re.compile(r"(\d+(?:\.\d+)?)[fFlLdD]"),
-        r"'\g<0>' ends with a letter: all numbers are of one kind",
+        "'{0}' ends with a letter: all numbers are of one kind",
         "",
         lambda match: match[1],
     ),
     (re.compile(r"(\d+(?:\.\d+)?)deg"), "an angle has no unit: all are degrees", "", lambda match: match[1]),
     (
         re.compile(r"(\d+(?:\.\d+)?)([A-Za-z_]\w*)"),
-        r"the number \1 touches the name \2",
-        r"write \1*\2 for the product, or a space between two values",
+        "the number {1} touches the name {2}",
+        "write {1}*{2} for the product, or a space between two values",
         None,
     ),
-    (re.compile(r".*", re.DOTALL), r"'\g<0>' is no number", "a number looks like 2, 0.5 or 1.5e-3", None),
+    (re.compile(r".*", re.DOTALL), "'{0}' is no number", "a number looks like 2, 0.5 or 1.5e-3", None),
 )
 
 
@@ -229,8 +229,9 @@ def _malformed_number(reading: Reading, node: Node, text: str) -> syntax.Number:
     for pattern, message, hint, mend in _MALFORMED:
         if match := pattern.fullmatch(text):
             read = mend(match) if mend else text
-            hint = hint or f"write {read}"
-            reading.complain(node, match.expand(message), match.expand(hint), mend=read if mend else None)
+            parts = match[0], *match.groups()
+            hint = hint.format(*parts) or f"write {read}"
+            reading.complain(node, message.format(*parts), hint, mend=read if mend else None)
             break
     text = read
     start = _NUMBER.match(text)

@@ -171,3 +171,15 @@ def test_a_name_in_a_file_of_two_scenes_is_read_anew(tmp_path):
     for scene in library.scenes:
         assert [each.diagnostic.message[:20] for each in scene.messages(library)] == ["unknown name 'xT_up'"]
         assert scene.uses("T_up") and len(scene.uses("xT_up")) == 1
+
+
+def test_what_a_wrong_name_hid_is_told_when_the_name_is_right():
+    """A term's first mistake is the only one that is told of it."""
+    project = Project()
+    text = b"Selection A { A -> C_x (T_y box + T_x box); }\nTransformation T_x { roty 9; }\nTransformation C_xx { roty 9; }\n"
+    document = project.open(None, text, name="x")
+    assert [each[3][:18] for each in told(project, document)] == ["unknown name 'C_x'"]
+    at = text.index(b"C_x ") + 3
+    project.edit(document, at, at, b"x")
+    assert [each[3][:18] for each in told(project, document)] == ["unknown name 'T_y'"]
+    check(project, document)
