@@ -10,7 +10,7 @@ Example::
     memory.ask(guards_of, symbol)               # guards_of(symbol)
     memory.ask(guards_of, symbol)               # known
     memory.ask(decided, symbol, given=(0.0,))   # decided(symbol, 0.0)
-    memory.end_round()                          # what wasn't asked since the last time is forgotten
+    memory.end_round()                          # now and then what isn't asked any more is forgotten
 """
 
 from __future__ import annotations
@@ -21,32 +21,41 @@ from typing import Any, Callable, Hashable
 class Memory:
     def __init__(self) -> None:
         self._known: dict[tuple, tuple[tuple, Any]] = {}
-        self._asked: dict[tuple, tuple[tuple, Any]] = {}
+        self._asked: dict[tuple, tuple[tuple, Any]] | None = {}  # in this round; None in most rounds
+        self._most = 0  # answers, before it is noted again which are asked for
 
     def ask(self, question: Callable[..., Any], *nodes: object, given: tuple[Hashable, ...] = ()) -> Any:
         """``question(*nodes, *given)``, worked out once; nodes are told apart by identity, what is given by value. The answer
         is shared: it must not be changed."""
-        found = self._recall((question, given, *map(id, nodes)))
-        return found[1] if found is not None else self._keep(question, given, nodes, question(*nodes, *given))
+        key = (question, given, *map(id, nodes))
+        found = self._known.get(key)
+        if found is None:
+            return self._keep(key, nodes, question(*nodes, *given))
+        if self._asked is not None:
+            self._asked[key] = found
+        return found[1]
 
     def ask_in_turn(self, question: Callable[..., Any], *nodes: object, given: tuple[Hashable, ...] = ()) -> Any:
         """As ``ask``, of a question that asks others: ``question(ask, *nodes, *given)``."""
-        found = self._recall((question, given, *map(id, nodes)))
-        return found[1] if found is not None else self._keep(question, given, nodes, question(self.ask, *nodes, *given))
-
-    def _recall(self, key: tuple) -> tuple[tuple, Any] | None:
-        found = self._asked.get(key)
-        if found is None:
-            found = self._known.get(key)
-            if found is not None:
-                self._asked[key] = found
-        return found
-
-    def _keep(self, question: Callable[..., Any], given: tuple, nodes: tuple, answer: Any) -> Any:
         key = (question, given, *map(id, nodes))
-        self._known[key] = self._asked[key] = nodes, answer  # the nodes, so that their ids stay their own
+        found = self._known.get(key)
+        if found is None:
+            return self._keep(key, nodes, question(self.ask, *nodes, *given))
+        if self._asked is not None:
+            self._asked[key] = found
+        return found[1]
+
+    def _keep(self, key: tuple, nodes: tuple, answer: Any) -> Any:
+        self._known[key] = nodes, answer  # the nodes, so that their ids stay their own
+        if self._asked is not None:
+            self._asked[key] = nodes, answer
         return answer
 
     def end_round(self) -> None:
-        """Forget what wasn't asked since the last call: it is about nodes that are gone."""
-        self._known, self._asked = self._asked, {}
+        """When there are twice as many answers as a round needs, note in the next one which it asks for, and forget the others
+        at its end: they are about nodes that are gone."""
+        if self._asked is not None:
+            self._known, self._asked = self._asked, None
+            self._most = 2 * len(self._known)
+        elif len(self._known) > self._most:
+            self._asked = {}
