@@ -111,5 +111,9 @@ def _check_unused(view: View, diagnostics: Diagnostics) -> None:
 def _read_parameters(view: View) -> frozenset[str]:
     """The parameters that something reads, their own updates apart; those of operators that nothing uses count
     as read, since the operators themselves are reported."""
-    read = frozenset().union(*(view.ask_in_turn(read_by, production) for production in view.productions))
+    read = view.ask_again(_union, [view.ask_in_turn(read_by, production) for production in view.productions])
     return read.union(name for name in view.model.parameters if name not in view.writes)
+
+
+def _union(several: list[frozenset[str]]) -> frozenset[str]:
+    return frozenset().union(*several)

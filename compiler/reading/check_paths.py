@@ -46,35 +46,36 @@ class Flow(NamedTuple):
 
 def check_paths(view: View, diagnostics: Diagnostics) -> None:
     """Report reads before assignment, each place once."""
-    found = assigned_at(view)
+    flows = {name: view.ask(flow_of, symbol.production) for name, symbol in view.model.symbols.items()}
+    placed = [view.ask(flow_of, each.body) for each in view.model.objects]
     reporter = _Reporter(view, diagnostics)
-    starts = [(placed.symbol, placed.body, Known()) for placed in view.model.objects]
-    starts += [(name, view.model.symbols[name].production, known) for name, known in found.items()]
-    for owner, production, known in starts:
-        if not view.ask(flow_of, production).exposed <= known.must:
-            reporter.follow(owner, production, known)
+    for each, flow in zip(view.model.objects, placed):
+        if flow.exposed:
+            reporter.follow(each.symbol, each.body, Known())
+    for name, known in view.ask_again(exposed_at, placed, flows):
+        reporter.follow(name, view.model.symbols[name].production, known)
 
 
-def assigned_at(view: View) -> dict[str, Known]:
-    """What is assigned at each symbol that objects lead to."""
+def exposed_at(starts: list[Flow], flows: dict[str, Flow]) -> list[tuple[str, Known]]:
+    """The symbols that read what isn't assigned on all paths from the objects, with what is assigned there."""
     at: dict[str, Known] = {}
     waiting: dict[str, None] = {}
 
-    def follow(production: Production, known: Known) -> None:
-        for name, assigned in view.ask(flow_of, production).leaves:
-            if name in view.model.symbols:
+    def follow(flow: Flow, known: Known) -> None:
+        for name, assigned in flow.leaves:
+            if name in flows:
                 before = at.get(name)
                 joined = known.with_(assigned).joined(before)
                 if joined != before:
                     at[name] = joined
                     waiting[name] = None
 
-    for placed in view.model.objects:
-        follow(placed.body, Known())
+    for flow in starts:
+        follow(flow, Known())
     while waiting:
         name = waiting.popitem()[0]
-        follow(view.model.symbols[name].production, at[name])
-    return at
+        follow(flows[name], at[name])
+    return [(name, known) for name, known in at.items() if not flows[name].exposed <= known.must]
 
 
 def flow_of(production: Production) -> Flow:

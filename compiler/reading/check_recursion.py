@@ -44,17 +44,17 @@ UNBOUNDED = {"greater": 1, "greater_equal": 1, "less": -1, "less_equal": -1}
 def check_recursion(view: View, diagnostics: Diagnostics) -> None:
     """Report on the recursions that the scene's objects lead to."""
     reached = {name: symbol for name, symbol in view.model.symbols.items() if name in view.reached}
-    found = components({name: view.entered(symbol.production) for name, symbol in reached.items()})
-    endless = _endless(view, reached, found)
-    place = {name: i for i, name in enumerate(reached)}
-    for component in found:
-        members = [reached[name] for name in sorted(component, key=place.__getitem__)]
-        if len(members) > 1 or members[0].name in view.entered(members[0].production):
-            if component & endless:
-                diagnostics.items += view.ask(said_of_endless, *members, given=(view.seed,))
-            else:
-                given = view.seed, _starts_of(view, members)
-                diagnostics.items += view.ask(said_of_cycle, *members, given=given)
+    edges = {name: view.edges[name] for name in reached}
+    endless = view.ask_again(_endless, edges, {
+        name: view.ask(endings, symbol.production, given=(view.seed,)) for name, symbol in reached.items()
+    })  # fmt: skip
+    for names in view.ask_again(_recursions, edges):
+        members = [reached[name] for name in names]
+        if not endless.isdisjoint(names):
+            diagnostics.items += view.ask(said_of_endless, *members, given=(view.seed,))
+        else:
+            given = view.seed, _starts_of(view, members)
+            diagnostics.items += view.ask(said_of_cycle, *members, given=given)
 
 
 def _starts_of(view: View, members: list[Symbol]) -> Values:
@@ -122,19 +122,26 @@ def _report_endless(symbol: Symbol, members: list[Symbol], diagnostics: Diagnost
     diagnostics.add("endless", symbol.name_span, message, hint)
 
 
-def _endless(view: View, symbols: dict[str, Symbol], found: list[frozenset[str]]) -> set[str]:
+def _recursions(edges: dict[str, frozenset[str]]) -> list[list[str]]:
+    """The symbols that lead back to themselves, those that lead to each other together, in the order of ``edges``."""
+    place = {name: i for i, name in enumerate(edges)}
+    found = (sorted(component, key=place.__getitem__) for component in components(edges))
+    return [names for names in found if len(names) > 1 or names[0] in edges[names[0]]]
+
+
+def _endless(edges: dict[str, frozenset[str]], endings: dict[str, tuple[frozenset[str], ...]]) -> frozenset[str]:
     """The symbols none of whose derivations is finite: the complement of a least fixpoint, component by component
     (what a component enters comes before it)."""
     ending: set[str] = set()
-    for component in found:
+    for component in components(edges):
         changed = True
         while changed:
             changed = False
             for name in component - ending:
-                if any(needed <= ending for needed in view.ask(endings, symbols[name].production, given=(view.seed,))):
+                if any(needed <= ending for needed in endings[name]):
                     ending.add(name)
                     changed = True
-    return set(symbols) - ending
+    return frozenset(edges) - ending
 
 
 def _check_cycle(members: list[Symbol], starts: Starts, diagnostics: Diagnostics) -> None:

@@ -22,6 +22,7 @@ class Memory:
     def __init__(self) -> None:
         self._known: dict[tuple, tuple[tuple, Any]] = {}
         self._asked: dict[tuple, tuple[tuple, Any]] | None = {}  # in this round; None in most rounds
+        self._last: dict[Callable[..., Any], tuple[Any, Any]] = {}
         self._most = 0  # answers, before it is noted again which are asked for
 
     def ask(self, question: Callable[..., Any], *nodes: object, given: tuple[Hashable, ...] = ()) -> Any:
@@ -44,6 +45,14 @@ class Memory:
         if self._asked is not None:
             self._asked[key] = found
         return found[1]
+
+    def ask_again(self, question: Callable[..., Any], *values: Any) -> Any:
+        """``question(*values)``, worked out where the values aren't equal to those of the last time: for what goes through a
+        whole scene, of which an edit hardly ever changes more than places. Neither values nor answer may be changed."""
+        last = self._last.get(question)
+        if last is None or last[0] != values:
+            last = self._last[question] = values, question(*values)
+        return last[1]
 
     def _keep(self, key: tuple, nodes: tuple, answer: Any) -> Any:
         self._known[key] = nodes, answer  # the nodes, so that their ids stay their own

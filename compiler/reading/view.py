@@ -33,7 +33,7 @@ class Uses(NamedTuple):
 class View:
     def __init__(self, model: Model, memory: Memory) -> None:
         self.model, self.seed = model, seed_of(model)
-        self.ask, self.ask_in_turn = memory.ask, memory.ask_in_turn
+        self.ask, self.ask_in_turn, self.ask_again = memory.ask, memory.ask_in_turn, memory.ask_again
         self.productions: list[Production] = [placed.body for placed in model.objects]  # type: ignore[misc]
         self.productions += [symbol.production for symbol in model.symbols.values()]
 
@@ -66,16 +66,14 @@ class View:
         return self.ask_in_turn(intervals_of, *self.calculations)
 
     @cached_property
-    def reached(self) -> set[str]:
+    def edges(self) -> dict[str, frozenset[str]]:
+        """The symbols that each symbol leads to."""
+        return {name: self.entered(symbol.production) for name, symbol in self.model.symbols.items()}
+
+    @cached_property
+    def reached(self) -> frozenset[str]:
         """The symbols that the scene's objects lead to, guards ignored."""
-        symbols, found = self.model.symbols, set()
-        waiting = [name for placed in self.model.objects for name in self.entered(placed.body)]  # type: ignore[arg-type]
-        while waiting:
-            name = waiting.pop()
-            if name not in found and name in symbols:
-                found.add(name)
-                waiting += self.entered(symbols[name].production)
-        return found
+        return self.ask_again(reached_from, [self.entered(placed.body) for placed in self.model.objects], self.edges)  # type: ignore[arg-type]
 
     @cached_property
     def uses(self) -> list[Uses]:
@@ -93,6 +91,17 @@ def _writes_of(ask: Ask, *calculations: Calculate) -> dict[str, list[tuple[int, 
         for name, value in ask(constants_of, operator):
             found.setdefault(name, []).append((id(operator), value))
     return found
+
+
+def reached_from(starts: list[frozenset[str]], edges: dict[str, frozenset[str]]) -> frozenset[str]:
+    found: set[str] = set()
+    waiting = [name for names in starts for name in names]
+    while waiting:
+        name = waiting.pop()
+        if name not in found and name in edges:
+            found.add(name)
+            waiting += edges[name]
+    return frozenset(found)
 
 
 def ways_of(production: Production) -> tuple[Way, ...]:
