@@ -33,10 +33,10 @@ static pl_span clip_bevels(const pl_gate_box *gate, const double o[3], const dou
         const double inverse = 1.0 / along[i];
         const double low = ((double)gate->low[i] - BEVEL_SLACK * slack - at[i]) * inverse;
         const double high = ((double)gate->high[i] + BEVEL_SLACK * slack - at[i]) * inverse;
-        enter[i] = along[i] < 0.0 ? high : low;
-        leave[i] = along[i] < 0.0 ? low : high;
+        enter[i] = inverse < 0.0 ? high : low;
+        leave[i] = inverse < 0.0 ? low : high;
     }
-    /* A ray in a plane gives NaN, which is left aside. */
+    /* A ray in a plane gives NaN, which is left aside; along -0 as well as along 0 it is between planes or not. */
     for (int i = 0; i < PL_GATE_BEVELS; i++) {
         within.enter = enter[i] > within.enter ? enter[i] : within.enter;
         within.leave = leave[i] < within.leave ? leave[i] : within.leave;

@@ -145,6 +145,21 @@ def test_a_cut_off_in_too_small_a_budget_names_the_need():
         picture(forest(4, 7), detail=1.0, memory=400_000)
 
 
+def test_gates_of_classes_tell_no_zero_from_its_negative():
+    """Straight down, all sums of a direction's first two components are zeros: either sign of them is the same ray."""
+    side = np.linspace(0.5, 79.5, 40)
+    origins = np.stack([*np.meshgrid(side, side), np.full((40, 40), 30.0)], axis=-1).reshape(-1, 3)
+    with Scene(forest(4, 7), detail=1.0) as scene:
+        expected, *others = (
+            scene.intersect(origins, np.broadcast_to([x, y, -1.0], origins.shape)) for x in (0.0, -0.0) for y in (0.0, -0.0)
+        )
+        assert scene.statistics["lazy"]["unfolded"] > 0
+    assert 0 < np.isfinite(expected.t).sum() < len(origins)
+    for found in others:
+        np.testing.assert_array_equal(found.primitive, expected.primitive)
+        np.testing.assert_array_equal(found.t, expected.t)
+
+
 PROBE = """
 import resource, sys
 from plsys.runtime import Scene
