@@ -151,7 +151,9 @@ def test_gates_of_classes_tell_no_zero_from_its_negative():
     origins = np.stack([*np.meshgrid(side, side), np.full((40, 40), 30.0)], axis=-1).reshape(-1, 3)
     with Scene(forest(4, 7), detail=1.0) as scene:
         expected, *others = (
-            scene.intersect(origins, np.broadcast_to([x, y, -1.0], origins.shape)) for x in (0.0, -0.0) for y in (0.0, -0.0)
+            scene.intersect(origins, np.broadcast_to([x, y, -1.0], origins.shape))
+            for x in (0.0, -0.0)
+            for y in (0.0, -0.0)
         )
         assert scene.statistics["lazy"]["unfolded"] > 0
     assert 0 < np.isfinite(expected.t).sum() < len(origins)
