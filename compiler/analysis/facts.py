@@ -58,7 +58,8 @@ class Facts:
     """See the module. They stay the same object while letters are typed into the block's names (retouch.py). ``text`` is what was parsed; ``definitions`` are those that
     name something; ``blocks`` are scene blocks; ``assigned`` are the names that get values, in text order; ``ghosts`` are
     definitions of an earlier text that this one has lost to a syntax error; ``spans`` are all places in ``file``, if
-    there are no messages in ``syntax``; ``right`` is the last text that nothing was wrong with, and when that was (Namespace.now)."""
+    there are no messages in ``syntax``; ``right`` is the last text that nothing was wrong
+    with, and when that was (Namespace.now)."""
 
     text: bytes
     _tree: Tree | None

@@ -2,7 +2,8 @@ r"""The table of habits from other languages; :mod:`habits` says how it is used.
 
 A pattern is matched against a line whose comments are blank and whose strings hold underscores only. What the message is
 about is the group ``at``, which ``\0`` in a text stands for; ``\1`` and on are groups. The first row that fits counts, so that
-special ones stand before general ones.
+special ones stand before general ones. A pattern that begins with a word says so (``\b``): tried at each letter of each
+word, it would cost the square of their lengths.
 
 Example: ``Habit(_RULES, r"-{2,}>", "'-->' stands …", mend="->")`` is for ``A --> box;`` and writes ``->`` instead.
 """
@@ -120,9 +121,9 @@ HABITS: tuple[Habit, ...] = (
     # how rules choose
     _row(_RULES, r"\)\s*(?P<at>then\b)\s*", "no 'then' stands between a condition and its rule", mend=""),
     _row(_RULES, rf"\bif\s+(?P<at>(?!\()({_INNER}\)))\s*\w+\s*{_ARROW}", "this condition lacks its '('", mend=r"(\2"),
-    _row(_RULES, rf"(?P<at>(\w+)\s*{_ARROW}\s*(if\s*\({_INNER}\)))[^;]*;?", "a condition stands before its rule", mend=r"\3 \2 ->"),
-    _row(_RULES, rf"(?P<at>(\w+)\s*{_ARROW}\s*\(({_INNER}(?:[<>]|[=!]=){_INNER})\))", "a condition stands before its rule", mend=r"if (\3) \2 ->"),
-    _row(_RULES, rf"(?P<at>(\w+)\s*{_ARROW}\s*([^;?\[\]]*?)\s*\?\s*([^;:?]*?)\s*:\s*([^;:?]*?)\s*;)", "a rule chooses by `if`",
+    _row(_RULES, rf"(?P<at>\b(\w+)\s*{_ARROW}\s*(if\s*\({_INNER}\)))[^;]*;?", "a condition stands before its rule", mend=r"\3 \2 ->"),
+    _row(_RULES, rf"(?P<at>\b(\w+)\s*{_ARROW}\s*\(({_INNER}(?:[<>]|[=!]=){_INNER})\))", "a condition stands before its rule", mend=r"if (\3) \2 ->"),
+    _row(_RULES, rf"(?P<at>\b(\w+)\s*{_ARROW}\s*([^;?\[\]]*?)\s*\?\s*([^;:?]*?)\s*:\s*([^;:?]*?)\s*;)", "a rule chooses by `if`",
          mend=r"if (\3) \2 -> \4; else \2 -> \5;"),
     # conditions and expressions
     _row(_PL, rf"\bif\s*\({_INNER}(?P<at>=<)", r"'\0' is no operator", mend="<="),
@@ -133,7 +134,7 @@ HABITS: tuple[Habit, ...] = (
     _row(_PL, rf"\bif\s*\({_INNER}(?P<at>(?<!&)&(?!&)|\b(?:and|AND)\b)", r"'\0' is no operator", mend="&&"),
     _row(_PL, rf"\bif\s*\({_INNER}(?P<at>\b(?:or|OR)\b)", r"'\0' is no operator", mend="||"),
     _row(_PL, rf"\bif\s*\({_INNER}(?P<at>\b(?:not|NOT)\b\s*)(?=[\w(])", r"'\0' is no operator", "write !", "!"),
-    _row(_ANY, r"(?P<at>([\w.]+|\([^()]*\))\s*(?:\*\*|\^)\s*([\w.]+|\([^()]*\)))", "a power is written with a function", mend=r"pow(\2, \3)"),
+    _row(_ANY, r"(?P<at>((?<![\w.])[\w.]+|\([^()]*\))\s*(?:\*\*|\^)\s*([\w.]+|\([^()]*\)))", "a power is written with a function", mend=r"pow(\2, \3)"),
     _row(_PL, r"[\w)]\s*(?P<at>\bmod\b)[^;]*", r"'\0' is no operator", mend="%"),
     _row(_PL, rf"(?P<at>({_FUNCTION})\s+(-?[\w.]+))\s*[;)\],+*/-]", "a function's arguments stand in brackets", mend=r"\2(\3)"),
     _row(_PL, rf"(?P<at>({_FUNCTION})[\[{{]([^][{{}}]*)[\]}}])", "a function's arguments stand in round brackets", mend=r"\2(\3)"),
@@ -147,7 +148,7 @@ HABITS: tuple[Habit, ...] = (
     _row(_STATEMENTS, rf"=\s*(?P<at>if\s*\(({_INNER})\)\s*(?:then\s+)?([^;]+?)\s+else\s+([^;]+?))\s*;", "a value chooses by '?' and ':'", mend=r"\2 ? \3 : \4"),
     _row(_STATEMENTS, r"=\s*(?P<at>([^;=]+?)\s+if\s+([^;]+?)\s+else\s+([^;]+?))\s*;", "a value chooses by '?' and ':'", mend=r"\3 ? \2 : \4"),
     _row(_STATEMENTS, r"(?P<at>\?)[^:;]*;", "this '?' lacks its ':'", "a choice looks like n > 0 ? 1 : 2", None, "missing"),
-    _row(_STATEMENTS, r"(?P<at>\b(\w+)\s*=\s*(\w+)\s*=(?!=)\s*([^;=]+))", "a statement assigns to one name", mend=r"\3 = \4; \2 = \3"),
+    _row(_STATEMENTS, r"(?P<at>\b(\w+)\b\s*=\s*(\w+)\s*=(?!=)\s*([^;=]+))", "a statement assigns to one name", mend=r"\3 = \4; \2 = \3"),
     _row(_ANY, r"(?P<at>\b\d{1,3}(?:'\d{3})+)", "a number has no signs between its digits", mend=lambda text: text.replace("'", "")),
     _row(_STATEMENTS, r"=\s*(?P<at>(-?\d+),(\d+))\s*;", "a number has a point, not a comma", mend=r"\2.\3"),
     _row(_STATEMENTS, rf"(?P<at>,)\s*(?:\w+\s*[-+*/]?=(?!=)|{_OPERATION})", "a statement ends with ';'", mend=";"),

@@ -152,7 +152,7 @@ def extras(reading: Reading, tree: Tree) -> None:
     ]
     for i, node in enumerate(directives):
         _directive(reading, node, i > 0)
-    last = tree.root_node.children[-1] if tree.root_node.children else None
+    last = tree.root_node if b"/*" in reading.data else None
     while last is not None and last.type != "comment":
         last = last.children[-1] if last.children else None
     if last is not None and _is_unclosed_comment(reading.text(last)):

@@ -75,10 +75,12 @@ def _a_letter_off(name: str, names: Iterable[str]) -> str | None:
 
 
 def _without_a_letter(name: str, indexes: Sequence[NameIndex]) -> str | None:
-    """What ``name`` of three letters or more is with a letter too many in the middle of names that differ by little, such
-    as numbered ones: then the name that was meant is a neighbour in neither order."""
+    """As ``_a_letter_off``, for a letter too many among names that differ by little, such as numbered ones: there the name
+    that was meant is a neighbour in neither order."""
+    if len(name) < 3:
+        return None
     meant = (name[:i] + name[i + 1 :] for i in range(len(name)))
-    return max((other for other in meant if any(other in index.names for index in indexes)), default=None) if len(name) > 2 else None
+    return max((other for other in meant if any(other in index.names for index in indexes)), default=None)
 
 
 def _has_one_more(one: str, other: str) -> bool:
