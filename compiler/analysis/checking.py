@@ -48,13 +48,14 @@ SLICE_S = 0.2
 @dataclass
 class Outcome:
     """What is known about a part. ``is_broken``: names in it have no meaning, or it can't be read. ``model`` is None after
-    an error or when all is worked out."""
+    an error or when all is worked out. ``is_news``: more is known than was told."""
 
     diagnostics: list[Diagnostic]
     is_broken: bool
     model: Model | None
     forecast: Any = None
     insights: Any = None
+    is_news: bool = True
 
 
 @dataclass
@@ -198,12 +199,14 @@ class Work:
             order, places = scene.in_order(), scene.places()
             for part in _steps(scene, order, self.interruption):
                 now = time.perf_counter()
-                if part is not None and part.outcome is not None:
+                if part is not None and part.outcome is not None and part.outcome.is_news:
                     new[part] = None
                 is_paused = part is not None and must_pause()
                 if new and (part is None or is_paused or now - told_at > SLICE_S):
                     found = telling.answer(scene, scene.request, places, new)
                     answer(found._replace(share=_share(scene) if now - began > SLICE_S else None))
+                    for each in new:
+                        each.outcome.is_news = False
                     new, told_at, is_all_told = {}, now, not found.more
                 if is_paused:
                     return False
@@ -288,9 +291,9 @@ def _predict(outcome: Outcome, interruption: Interruption) -> None:
         outcome.insights = None
         return
     except (PlsysError, RecursionError):
-        outcome.model = None
+        outcome.model, outcome.is_news = None, True
         return
-    outcome.model = None
+    outcome.model, outcome.is_news = None, True
     outcome.diagnostics += outcome.forecast.diagnostics
 
 
