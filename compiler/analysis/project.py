@@ -156,7 +156,7 @@ class Project:
                     seen.append(scene)
                     scene.work()
                     yield scene
-                    users = {place.document for place in scene.uses(name)} - looked_at
+                    users = scene.documents_with(name) - looked_at
                     looked_at |= users
                     waiting += users
 

@@ -389,16 +389,21 @@ class Scene:
 
     def uses(self, name: str) -> list[Place]:
         """Every occurrence of the scene's own ``name``, with its role, in all files, in reading order."""
-        places = []
+        places: list[Place] = []
         for facts in self.users.get(name, ()):
-            document = self.document_of(facts.block)
-            if document is None:
-                continue
-            base = document.text.start_of(facts.block)
-            for each in facts.names:
-                if each.name == name:
-                    places.append(Place(document, base + each.start, base + each.end, each.role))
-        return sorted(places, key=self._reading_order)
+            block = facts.block
+            document = self.document_of(block)
+            if document is not None:
+                base = document.text.start_of(block)
+                found = [each for each in facts.names if each.name == name]
+                places += [Place(document, base + each.start, base + each.end, each.role) for each in found]
+        number = {document: i for i, document in enumerate(self.documents)}
+        return sorted(places, key=lambda place: (number[place.document], place.start))
+
+    def documents_with(self, name: str) -> set[Document]:
+        """The files in which ``name`` stands."""
+        found = {self.document_of(facts.block) for facts in self.users.get(name, ())}
+        return {document for document in found if document is not None}
 
     def names(self) -> dict[str, str]:
         """All names of the scene with their kinds."""
