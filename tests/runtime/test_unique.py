@@ -48,7 +48,7 @@ def picture(data: bytes, **options):
 @pytest.mark.parametrize("memory", [60_000, 400_000, 4_000_000])
 def test_a_budget_changes_no_bit_of_a_picture(memory):
     data = forest(2, 5)
-    expected, plain = picture(data, accelerator="none")
+    expected, _ = picture(data, accelerator="none")
     found, counts = picture(data, memory=memory, threads=2)
     for name, values in expected.items():
         np.testing.assert_array_equal(found[name], values, err_msg=name)
