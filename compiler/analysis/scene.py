@@ -147,7 +147,10 @@ class Scene:
                 self._forget(block)
                 self._names.forget(facts_of(block))
                 removed_includes |= b"include" in block.data and bool(facts_of(block).includes)
-                drop_facts(block)
+                if (readers := block.__dict__.get("readers", 1)) > 1:
+                    block.__dict__["readers"] = readers - 1  # another scene has yet to forget the same facts
+                else:
+                    drop_facts(block)
                 yield
             waiting = self._opened if len(change.added) >= MANY_BLOCKS else self._edited
             for block in change.added:
@@ -231,6 +234,7 @@ class Scene:
 
     def _learn(self, block: Block) -> None:
         facts = facts_of(block)
+        block.__dict__["readers"] = block.__dict__.get("readers", 0) + 1
         if facts.syntax:
             self._syntax[block] = facts.syntax
         if IGNORE_WORD in block.data:

@@ -183,3 +183,20 @@ def test_what_a_wrong_name_hid_is_told_when_the_name_is_right():
     project.edit(document, at, at, b"x")
     assert [each[3][:18] for each in told(project, document)] == ["unknown name 'T_y'"]
     check(project, document)
+
+
+def test_what_a_library_no_longer_defines_is_gone_in_all_its_scenes(tmp_path):
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.plsys").write_text('#include "library.plsys"\nobject { Tree }\n')
+    (tmp_path / "library.plsys").write_text("Selection Tree { Tree -> T_up sphere; }\nTransformation T_up { trans 0 0 1; }\n")
+    project = Project()
+    documents = [project.open(path, path.read_bytes()) for path in sorted(tmp_path.glob("*.plsys"))]
+    library = next(each for each in documents if each.path.stem == "library")
+    project.work()
+    at = library.text.data.index(b"T_up {")
+    for _ in range(2):  # the second time, what the first one gave is to be forgotten
+        project.edit(library, at, at, b"x")
+        project.work()
+    for scene in library.scenes:
+        assert [each.diagnostic.message[:19] for each in scene.messages(library)] == ["unknown name 'T_up'"]
+        assert set(scene.names()) == {"Tree", "xxT_up"}
