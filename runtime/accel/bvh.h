@@ -33,6 +33,13 @@ typedef struct pl_lanes {
     double o[3][PL_LANES], d[3][PL_LANES];
 } pl_lanes;
 
+/* Intervals of what nodes need of a packet's rays. A plane's distances from the origins lie on one side of that from near_o or
+ * far_o, and t is extreme at one end of the inverses. */
+typedef struct pl_beam {
+    float near_o[3], far_o[3], least[3], most[3];
+    uint32_t near_row[3], far_row[3]; /* offsets of a node's planes, in floats */
+} pl_beam;
+
 /* The same of a packet of rays, which share t0: axis by axis. front and instance stand in the frame of the same number. */
 typedef struct pl_packet_frame {
     double o[3][PL_LANES], d[3][PL_LANES];
@@ -44,6 +51,7 @@ typedef struct pl_packet_frame {
     unsigned lanes;  /* those that meet the box */
     unsigned mapped; /* fours of rays that normative is known of */
     uint32_t instance;
+    pl_beam beam;
     pl_lanes normative;
 } pl_packet_frame;
 

@@ -33,6 +33,7 @@ static inline void set_t_max(pl_packet_frame *f, const double *t_max)
     const __m256d from = _mm256_set1_pd(f->t0), rate = _mm256_set1_pd(f->rate * (1.0 + 0x1p-20));
     wide most = wide_set(0.0f);
     for (int first = 0; first < PL_LANES; first += HALF) {
+        if (!(f->lanes >> first & 0xFF)) continue;
         const __m256d low = (_mm256_loadu_pd(t_max + first) - from) * rate, high = (_mm256_loadu_pd(t_max + first + 4) - from) * rate;
         const wide t = wide_min(wide_max(wide_narrow(low, high), wide_set(1e-35f)), wide_set(1e30f));
         _mm256_storeu_ps(f->t_max + first, t);
@@ -48,6 +49,7 @@ static inline bool narrow(pl_packet_frame *f, unsigned lanes, float *far, float 
     unsigned finite = 0;
     wide farthest = wide_set(0.0f), least = wide_set(INFINITY), most = wide_set(0.0f);
     for (int first = 0; first < PL_LANES; first += HALF) {
+        if (!(lanes >> first & 0xFF)) continue;
         wide away = wide_set(0.0f), fast = wide_set(0.0f);
 #pragma GCC unroll 3
         for (int axis = 0; axis < 3; axis++) {
@@ -78,6 +80,7 @@ static inline unsigned lanes_in_box(pl_packet_frame *f, unsigned lanes, float *f
     unsigned met = 0;
     wide least = wide_set(INFINITY);
     for (int first = 0; first < PL_LANES; first += HALF) {
+        if (!(lanes >> first & 0xFF)) continue;
         wide enter = wide_set(0.0f), leave = wide_load(f->t_max + first);
 #pragma GCC unroll 3
         for (int axis = 0; axis < 3; axis++) {
@@ -129,29 +132,23 @@ static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double 
 
 /* --- beams --- */
 
-/* What the loop keeps at hand. A plane's distances from the origins lie on one side of that from near_o or far_o, and t
- * is extreme at one end of the inverses. */
-typedef struct beam {
-    wide near_o[3], far_o[3], least[3], most[3];
-    uint32_t near_row[3], far_row[3];
-} beam;
-
-/* false: the rays don't go the same way. */
-static inline bool look_along(beam *b, const pl_packet_frame *f)
+/* The rays of a frame's lanes become its beam. false: they don't go the same way. */
+static inline bool look_along(pl_packet_frame *f)
 {
+    pl_beam *b = &f->beam;
     for (int axis = 0; axis < 3; axis++) {
         float o_least, o_most, least, most;
-        span_of(f->origin[axis], f->lanes, &o_least, &o_most);
         span_of(f->inverse[axis], f->lanes, &least, &most);
         const bool negative = most < 0.0f;
         if (!negative && !(least > 0.0f)) return false;
+        span_of(f->origin[axis], f->lanes, &o_least, &o_most);
         if (o_most - o_least > f->front->wide) return false;
         o_least -= f->slack;
         o_most += f->slack;
-        b->near_o[axis] = wide_set(negative ? o_least : o_most);
-        b->far_o[axis] = wide_set(negative ? o_most : o_least);
-        b->least[axis] = wide_set(least);
-        b->most[axis] = wide_set(most);
+        b->near_o[axis] = negative ? o_least : o_most;
+        b->far_o[axis] = negative ? o_most : o_least;
+        b->least[axis] = least;
+        b->most[axis] = most;
         b->near_row[axis] = (uint32_t)(negative ? 3 + axis : axis) * PL_FRONT_WIDTH;
         b->far_row[axis] = (uint32_t)(negative ? axis : 3 + axis) * PL_FRONT_WIDTH;
     }
@@ -159,15 +156,16 @@ static inline bool look_along(beam *b, const pl_packet_frame *f)
 }
 
 /* As meet. */
-static inline unsigned meet_beam(const beam *b, float t_max, const pl_front_node *node, uint64_t *entries, pl_ref *nearest)
+static inline unsigned meet_beam(const pl_beam *b, float t_max, const pl_front_node *node, uint64_t *entries, pl_ref *nearest)
 {
     wide enter = wide_set(0.0f), leave = wide_set(t_max);
 #pragma GCC unroll 3
     for (int axis = 0; axis < 3; axis++) {
-        const wide near = wide_load(node->planes[0] + b->near_row[axis]) - b->near_o[axis];
-        const wide far = wide_load(node->planes[0] + b->far_row[axis]) - b->far_o[axis];
-        enter = wide_max(wide_min(near * b->least[axis], near * b->most[axis]), enter);
-        leave = wide_min(wide_max(far * b->least[axis], far * b->most[axis]), leave);
+        const wide near = wide_load(node->planes[0] + b->near_row[axis]) - wide_set(b->near_o[axis]);
+        const wide far = wide_load(node->planes[0] + b->far_row[axis]) - wide_set(b->far_o[axis]);
+        const wide least = wide_set(b->least[axis]), most = wide_set(b->most[axis]);
+        enter = wide_max(wide_min(near * least, near * most), enter);
+        leave = wide_min(wide_max(far * least, far * most), leave);
     }
     return wide_order(enter, leave, node->child, entries, nearest);
 }
@@ -253,6 +251,7 @@ static inline void descend_lanes(pl_packet_frame *f, const pl_packet_frame *pare
     f->rate = parent->rate;
     f->mapped = 0;
     for (int i = 0; i < PL_LANES; i += 4) {
+        if (!(parent->lanes >> i & 15)) continue;
         const __m256d x = _mm256_loadu_pd(parent->o[0] + i) - it->centre[0], y = _mm256_loadu_pd(parent->o[1] + i) - it->centre[1];
         const __m256d z = _mm256_loadu_pd(parent->o[2] + i) - it->centre[2];
         const __m256d u = _mm256_loadu_pd(parent->d[0] + i), v = _mm256_loadu_pd(parent->d[1] + i), w = _mm256_loadu_pd(parent->d[2] + i);
@@ -282,7 +281,7 @@ static inline bool offer_unbounded(pl_tracer *tracer, uint32_t index, unsigned l
 
 /* Begins frame `index` of the packet, whose rays are set; false in *beams: nothing is left to be done in it. */
 static inline bool enter_lanes(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, bool any,
-                               beam *b, bool *beams)
+                               bool *beams)
 {
     pl_packet_frame *f = &((pl_bvh_work *)tracer->work)->packets[index];
     bool done;
@@ -293,17 +292,23 @@ static inline bool enter_lanes(pl_tracer *tracer, uint32_t index, unsigned lanes
         if (done || !lanes) return true;
     }
     enum course course = begin_lanes(f, lanes, t_max);
-    if (course == AS_BEAM && !look_along(b, f)) course = ONE_BY_ONE;
+    if (course == AS_BEAM && !look_along(f)) course = ONE_BY_ONE;
     *beams = course == AS_BEAM;
     return course != ONE_BY_ONE || visit_one_by_one(tracer, index, f->lanes, queries, t_max, any);
 }
 
-/* Goes on with a frame after some of its rays met something. false: none of them wants more. */
-static inline bool go_on(pl_packet_frame *f, const pl_query *queries, const double *t_max, bool any)
+/* Goes on with a frame after some of its rays met something. */
+static inline void go_on(pl_packet_frame *f, const pl_query *queries, const double *t_max, bool any)
 {
-    if (any) f->lanes = lanes_left(queries, f->lanes);
+    if (any) {
+        const unsigned left = lanes_left(queries, f->lanes);
+        if (left && left != f->lanes) {
+            f->lanes = left;
+            look_along(f);
+        }
+        f->lanes = left;
+    }
     set_t_max(f, t_max);
-    return f->lanes != 0;
 }
 
 static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, double *t_max, bool any)
@@ -316,8 +321,7 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
     uint32_t index = 0;
     size_t top = 0;
     bool beams;
-    beam b;
-    if (!enter_lanes(tracer, 0, lanes, queries, t_max, any, &b, &beams)) return false;
+    if (!enter_lanes(tracer, 0, lanes, queries, t_max, any, &beams)) return false;
     if (!beams) return true;
     pl_packet_frame *f = &w->packets[0];
     uint64_t *stack = w->packet_stack;
@@ -329,7 +333,7 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
         if (entry_is_beyond(at, f->most)) continue;
         if (any && !f->lanes && ref >> PL_REF_SHIFT != PL_KIND_RETURN) continue;
         while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
-            const unsigned count = meet_beam(&b, f->most, &f->front->nodes[ref], stack + top, &ref);
+            const unsigned count = meet_beam(&f->beam, f->most, &f->front->nodes[ref], stack + top, &ref);
             steps++;
             if (count == 0) goto next;
             top += count - 1;
@@ -342,7 +346,7 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
         if (kind == PL_KIND_RETURN) {
             if (index == 0) break;
             f = &w->packets[--index];
-            if (go_on(f, queries, t_max, any)) look_along(&b, f);
+            go_on(f, queries, t_max, any);
         } else if (kind == PL_KIND_INSTANCE) {
             const uint32_t instance = ref & PL_REF_INDEX;
             const pl_front_instance *it = &f->front->instances[instance];
@@ -355,13 +359,13 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
             w->lanes->frames[index + 1].front = inner->front;
             tracer->counters.instances++;
             descend_lanes(inner, f, it);
-            if (!enter_lanes(tracer, index + 1, f->lanes, queries, t_max, any, &b, &beams)) return false;
+            if (!enter_lanes(tracer, index + 1, f->lanes, queries, t_max, any, &beams)) return false;
             if (beams) {
                 f = &w->packets[++index];
                 stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
                 stack[top++] = entry_of(0.0f, f->front->root);
-            } else if (go_on(f, queries, t_max, any)) {
-                look_along(&b, f);
+            } else {
+                go_on(f, queries, t_max, any);
             }
             if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
         } else {

@@ -56,7 +56,7 @@ static inline sight sight_in_lane(const sights *all, int lane)
 }
 
 /* As meet_tile. */
-static inline unsigned meet_tile_beam(const beam *b, float t_max, const pl_terrain_tile *tile, uint64_t *entries, uint32_t *nearest)
+static inline unsigned meet_tile_beam(const pl_beam *b, float t_max, const pl_terrain_tile *tile, uint64_t *entries, uint32_t *nearest)
 {
     wide enter = wide_set(0.0f), leave = wide_set(t_max);
 #pragma GCC unroll 3
@@ -71,7 +71,7 @@ static inline unsigned meet_tile_beam(const beam *b, float t_max, const pl_terra
 }
 
 /* The lanes whose rays meet a cluster's box. */
-static inline unsigned lanes_in_cluster(const pl_packet_frame *f, const beam *b, const pl_terrain_tile *tile, uint32_t cluster)
+static inline unsigned lanes_in_cluster(const pl_packet_frame *f, const pl_beam *b, const pl_terrain_tile *tile, uint32_t cluster)
 {
     float near[3], far[3];
     unsigned met = 0;
@@ -100,7 +100,6 @@ typedef struct convoy {
     const pl_ray *rays; /* in the terrain's frame */
     pl_query *queries;
     double t_max[PL_LANES];
-    beam beam;
 } convoy;
 
 /* Tests a cluster's triangles with the rays that meet its box. false: an error. First all filters and then the candidates: so
@@ -109,7 +108,7 @@ static inline bool visit_cluster_beam(pl_tracer *tracer, convoy *c, const sights
 {
     const pl_terrain_tile *it = pl_terrain_tile_at(c->terrain, tile);
     const unsigned there = facets_of(c->terrain, cluster);
-    unsigned lanes = there ? lanes_in_cluster(c->frame, &c->beam, it, cluster) : 0, left[PL_LANES], hit = 0;
+    unsigned lanes = there ? lanes_in_cluster(c->frame, &c->frame->beam, it, cluster) : 0, left[PL_LANES], hit = 0;
     facets f;
     if (!lanes) return true;
     unpack_cluster(it, cluster, all->slack, &f);
@@ -140,7 +139,7 @@ static inline bool visit_tile_beam(pl_tracer *tracer, convoy *c, uint32_t index)
     const pl_terrain_tile *tile = pl_terrain_tile_at(c->terrain, index);
     uint64_t entries[PL_TERRAIN_CLUSTERS];
     uint32_t cluster;
-    unsigned count = meet_tile_beam(&c->beam, c->frame->most, tile, entries, &cluster);
+    unsigned count = meet_tile_beam(&c->frame->beam, c->frame->most, tile, entries, &cluster);
     sights s;
     if (count == 0) return true;
     sights_of(c->frame, tile, &s);
@@ -163,7 +162,7 @@ static bool travel_as_beam(pl_tracer *tracer, convoy *c, uint64_t *stack)
         pl_ref ref = (pl_ref)entry;
         if (entry_is_beyond(entry, c->frame->most)) continue;
         while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
-            const unsigned count = meet_beam(&c->beam, c->frame->most, &nodes[ref], stack + top, &ref);
+            const unsigned count = meet_beam(&c->frame->beam, c->frame->most, &nodes[ref], stack + top, &ref);
             steps++;
             if (count == 0) goto next;
             top += count - 1;
@@ -222,7 +221,7 @@ bool TERRAIN_PACKET(pl_tracer *tracer, const pl_terrain *terrain, const pl_ray *
     if (count >= PL_LEAST_LANES && make_packet(c.frame, &terrain->front, rays, queries, count, c.t_max)) {
         const enum course course = begin_lanes(c.frame, (1u << count) - 1, c.t_max);
         if (course == ASTRAY) goto end;
-        beams = course == AS_BEAM && look_along(&c.beam, c.frame);
+        beams = course == AS_BEAM && look_along(c.frame);
     }
     ok = beams ? travel_as_beam(tracer, &c, w->packet_stack)
                : travel_as_stream(tracer, terrain, rays, queries, count, w->packet_stack);
