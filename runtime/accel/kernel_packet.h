@@ -4,7 +4,7 @@
  * In nodes a packet is one *beam*: intervals of its origins and of its directions' inverses, so that a child is met or
  * missed for all rays at once by about twice the arithmetic of one ray (interval arithmetic in packets: Boulos, Wald &
  * Shirley 2006, "Geometric and arithmetic culling methods for entire ray packets"). At instances and primitives the rays are
- * told apart, eight at a time. Where directions differ in sign, or few rays are left, these go on one by one.
+ * told apart, eight at a time. Where directions differ in sign, or three or fewer rays are left, these go on one by one.
  *
  * The same filters, wider: candidates are mapped down the path and evaluated as those of single rays are, so packets
  * can't show in hits. */
@@ -13,7 +13,7 @@
 #include "kernel_offer.h"
 
 /* So few go on alone. */
-enum { FEW = 2 };
+enum { FEW = 3 };
 
 /* --- frames --- */
 
@@ -42,12 +42,11 @@ static inline void set_t_max(pl_packet_frame *f, const double *t_max)
     f->most = wide_most(most);
 }
 
-/* Single precision from double; the largest |o| and the range of |d| (sums of axes) in some lanes. false: some aren't
- * finite. */
-static inline bool narrow(pl_packet_frame *f, unsigned lanes, float *far, float *slowest, float *fastest)
+/* Single precision from double; the largest |o| (sums of axes) in some lanes. false: a ray isn't finite, or too slow or fast. */
+static inline bool narrow(pl_packet_frame *f, unsigned lanes, float *far)
 {
-    unsigned finite = 0;
-    wide farthest = wide_set(0.0f), least = wide_set(INFINITY), most = wide_set(0.0f);
+    unsigned fit = 0;
+    wide farthest = wide_set(0.0f);
     for (int first = 0; first < PL_LANES; first += HALF) {
         if (!(lanes >> first & 0xFF)) continue;
         wide away = wide_set(0.0f), fast = wide_set(0.0f);
@@ -61,16 +60,12 @@ static inline bool narrow(pl_packet_frame *f, unsigned lanes, float *far, float 
             away += wide_absolute(o);
             fast += wide_absolute(d);
         }
-        const wide in = wide_lanes(lanes >> first & 0xFF);
-        farthest = wide_max(wide_and(away, in), farthest);
-        least = wide_min(_mm256_blendv_ps(least, fast, in), least);
-        most = wide_max(wide_and(fast, in), most);
-        finite |= wide_mask_of(_mm256_cmp_ps(away + fast, wide_set(INFINITY), _CMP_LT_OQ)) << first;
+        const wide moves = wide_and(_mm256_cmp_ps(fast, wide_set(SLOW), _CMP_GE_OQ), _mm256_cmp_ps(fast, wide_set(FAST), _CMP_LE_OQ));
+        farthest = wide_max(wide_and(away, wide_lanes(lanes >> first & 0xFF)), farthest);
+        fit |= wide_mask_of(wide_and(moves, _mm256_cmp_ps(away, wide_set(INFINITY), _CMP_LT_OQ))) << first;
     }
     *far = wide_most(farthest);
-    *slowest = wide_least(least);
-    *fastest = wide_most(most);
-    return !(lanes & ~finite);
+    return !(lanes & ~fit);
 }
 
 /* Those of some lanes that meet the frame's box, and the first t at which one does. Sets inverses. */
@@ -109,10 +104,10 @@ static inline float packet_slack(const pl_packet_frame *f, float far)
 /* Begins a frame with the rays f->o and f->d of some lanes: which of them meet the box, and how they go on. */
 static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double *t_max)
 {
-    float far, slowest, fastest, first_t;
+    float far, first_t;
     f->lanes = lanes;
     if (f->front->root == PL_NOTHING) return ASTRAY;
-    if (!narrow(f, lanes, &far, &slowest, &fastest) || !(slowest >= SLOW && fastest <= FAST)) return ONE_BY_ONE;
+    if (!narrow(f, lanes, &far)) return ONE_BY_ONE;
     set_t_max(f, t_max);
     f->slack = packet_slack(f, far);
     if (!(f->slack < 1.0f)) return ONE_BY_ONE;
@@ -123,7 +118,7 @@ static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double 
         for (int axis = 0; axis < 3; axis++)
             for (int i = 0; i < PL_LANES; i++) f->o[axis][i] += (double)first_t * f->d[axis][i];
         f->error += 0x1p-49f * (f->distance + far);
-        if (!narrow(f, f->lanes, &far, &slowest, &fastest) || !(far <= FAR)) return ONE_BY_ONE;
+        if (!narrow(f, f->lanes, &far) || !(far <= FAR)) return ONE_BY_ONE;
         set_t_max(f, t_max);
         f->slack = packet_slack(f, far);
     }
