@@ -94,7 +94,8 @@ static inline unsigned lanes_in_box(pl_packet_frame *f, unsigned lanes, float *f
     return met;
 }
 
-enum course { ASTRAY, AS_BEAM, ONE_BY_ONE };
+/* ONE_BY_ONE: from the frame's box on; APART: each from the beginning, as it can't be told in single precision yet. */
+enum course { ASTRAY, AS_BEAM, ONE_BY_ONE, APART };
 
 static inline float packet_slack(const pl_packet_frame *f, float far)
 {
@@ -107,10 +108,10 @@ static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double 
     float far, first_t;
     f->lanes = lanes;
     if (f->front->root == PL_NOTHING) return ASTRAY;
-    if (!narrow(f, lanes, &far)) return ONE_BY_ONE;
+    if (!narrow(f, lanes, &far)) return APART;
     set_t_max(f, t_max);
     f->slack = packet_slack(f, far);
-    if (!(f->slack < 1.0f)) return ONE_BY_ONE;
+    if (!(f->slack < 1.0f)) return APART;
     f->lanes = lanes_in_box(f, lanes, &first_t);
     if (!f->lanes) return ASTRAY;
     if (far > FAR) { /* all go on together to where the first of them enters */
@@ -118,7 +119,7 @@ static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double 
         for (int axis = 0; axis < 3; axis++)
             for (int i = 0; i < PL_LANES; i++) f->o[axis][i] += (double)first_t * f->d[axis][i];
         f->error += 0x1p-49f * (f->distance + far);
-        if (!narrow(f, f->lanes, &far) || !(far <= FAR)) return ONE_BY_ONE;
+        if (!narrow(f, f->lanes, &far) || !(far <= FAR)) return APART;
         set_t_max(f, t_max);
         f->slack = packet_slack(f, far);
     }
@@ -195,26 +196,50 @@ static bool map_alone(pl_tracer *tracer, pl_error *error)
     return true;
 }
 
-/* The rays of some lanes one by one through what lies below frame `index` of the packet. */
-static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, bool any)
+/* Begins a single ray's frame with a lane of a packet's that meets the box. */
+static inline void begin_alone(pl_frame *f, const pl_packet_frame *from, int lane)
+{
+    float4 o = {0}, d = {0}, inverse = {0};
+    for (int axis = 0; axis < 3; axis++) {
+        f->o[axis] = from->o[axis][lane];
+        f->d[axis] = from->d[axis][lane];
+        o[axis] = from->origin[axis][lane];
+        d[axis] = from->direction[axis][lane];
+        inverse[axis] = from->inverse[axis][lane];
+    }
+    f->slack = from->slack;
+    f->mapped = f->blind = false;
+    set_ray(f, o, d, inverse);
+}
+
+/* The same, as the ray comes to the frame. false: nothing is met. */
+static bool begin_apart(pl_frame *f, const pl_packet_frame *from, int lane, double t_max, bool *met)
+{
+    const double4 o = {from->o[0][lane], from->o[1][lane], from->o[2][lane]};
+    const double4 d = {from->d[0][lane], from->d[1][lane], from->d[2][lane]};
+    f->blind = false;
+    float local_max = local_t_max(f, t_max);
+    *met = begin_frame(f, o, d, t_max, &local_max);
+    return *met || f->front->unbounded_count;
+}
+
+/* The rays of some lanes one by one through what lies below frame `index` of the packet; course: APART or ONE_BY_ONE. */
+static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, enum course course, pl_query *queries, double *t_max,
+                             bool any)
 {
     pl_bvh_work *w = tracer->work;
     const pl_packet_frame *from = &w->packets[index];
     for (; lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
         pl_frame *f = &w->lanes->frames[index];
-        float local_max = 1e30f;
+        bool met = true;
         f->front = from->front;
         f->error = from->error;
         f->distance = from->distance;
         f->t0 = from->t0;
         f->rate = from->rate;
-        const double4 o = {from->o[0][lane], from->o[1][lane], from->o[2][lane]};
-        const double4 d = {from->d[0][lane], from->d[1][lane], from->d[2][lane]};
-        f->blind = false;
-        local_max = local_t_max(f, t_max[lane]);
-        bool met = begin_frame(f, o, d, t_max[lane], &local_max);
-        if (!met && !f->front->unbounded_count) continue;
+        if (course == ONE_BY_ONE) begin_alone(f, from, lane);
+        else if (!begin_apart(f, from, lane, t_max[lane], &met)) continue;
         w->alone = lanes;
         w->alone_from = index;
         walk k;
@@ -267,7 +292,7 @@ static inline bool offer_unbounded(pl_tracer *tracer, uint32_t index, unsigned l
     const pl_front *front = w->packets[index].front;
     *all = false;
     for (uint32_t i = 0; i < front->unbounded_count; i++) *all = *all || front->unbounded[i] >> PL_REF_SHIFT == PL_KIND_INSTANCE;
-    if (*all) return visit_one_by_one(tracer, index, lanes, queries, t_max, any);
+    if (*all) return visit_one_by_one(tracer, index, lanes, APART, queries, t_max, any);
     for (uint32_t i = 0; i < front->unbounded_count; i++)
         if (!offer_lanes(tracer, index, front->unbounded[i], any ? lanes_left(queries, lanes) : lanes, queries, t_max))
             return false;
@@ -289,7 +314,7 @@ static inline bool enter_lanes(pl_tracer *tracer, uint32_t index, unsigned lanes
     enum course course = begin_lanes(f, lanes, t_max);
     if (course == AS_BEAM && !look_along(f)) course = ONE_BY_ONE;
     *beams = course == AS_BEAM;
-    return course != ONE_BY_ONE || visit_one_by_one(tracer, index, f->lanes, queries, t_max, any);
+    return course < ONE_BY_ONE || visit_one_by_one(tracer, index, f->lanes, course, queries, t_max, any);
 }
 
 /* Goes on with a frame after some of its rays met something. */
