@@ -17,6 +17,8 @@
 #include "bytecode.h"
 #include "plsys.h"
 
+#include <string.h>
+
 typedef struct pl_string {
     const char *text; /* NUL-terminated UTF-8 */
     uint32_t length;  /* bytes */
@@ -56,16 +58,44 @@ typedef struct pl_case {
 
 /* A constant transformation, with its inverse. */
 typedef struct pl_transform {
-    pl_affine to_object; /* the inverse; unspecified if singular */
-    bool singular;       /* the subtree below is to be dropped and counted */
-    uint8_t form;        /* pl_form of to_object */
+    uint64_t form : 3;     /* pl_form of to_object */
+    uint64_t singular : 1; /* the subtree below is to be dropped and counted */
+    uint64_t codes : 48;   /* where it is PL_FORM_PACKED */
+    pl_affine to_object;   /* the inverse; unspecified if singular */
     /* What follows is needed for building only: packed states (state.h) leave it out. */
     pl_affine to_parent; /* object to parent, as in the file */
     double stretch;      /* the largest singular value of to_parent, rounded up; set where detail cut-offs need it */
 } pl_transform;
 
-/* What of a map isn't trivial: rays through a translation or a scaling take less arithmetic. */
-typedef enum pl_form { PL_FORM_GENERAL, PL_FORM_DIAGONAL, PL_FORM_TRANSLATION } pl_form;
+/* What of a map isn't trivial: rays through a translation or a scaling take less arithmetic. A packed map is a general one of
+ * few different numbers, as that of a turn about an axis: to_object holds the sizes of those that are neither 0 nor 1, one
+ * after another and no more, and each of its entries is a code of four bits: 0, 1, or 2 + the number of a size, and 8 where
+ * it is negative. */
+typedef enum pl_form { PL_FORM_GENERAL, PL_FORM_PACKED, PL_FORM_DIAGONAL, PL_FORM_TRANSLATION } pl_form;
+
+enum { PL_PACKED_SIZES = 6 };
+
+/* Unpacks the twelve numbers of a packed map; not in line, since few maps on a path are packed. Returns room. */
+static __attribute__((noinline, unused)) const double *pl_transform_unpack(const pl_transform *transform, double room[12])
+{
+    double sizes[2 + PL_PACKED_SIZES] = {0.0, 1.0};
+    memcpy(sizes + 2, transform->to_object.m, PL_PACKED_SIZES * sizeof *sizes); /* whatever stands behind the last */
+    uint64_t codes = transform->codes;
+#pragma GCC unroll 12
+    for (int i = 0; i < 12; i++, codes >>= 4) {
+        uint64_t bits;
+        memcpy(&bits, &sizes[codes & 7], sizeof bits);
+        bits |= (codes & 8) << 60;
+        memcpy(&room[i], &bits, sizeof bits);
+    }
+    return room;
+}
+
+/* The twelve numbers of to_object, in `room` where they are packed. */
+static inline const double *pl_transform_entries(const pl_transform *transform, double room[12])
+{
+    return transform->form == PL_FORM_PACKED ? pl_transform_unpack(transform, room) : transform->to_object.m;
+}
 
 static inline pl_form pl_form_of(const pl_affine *map)
 {

@@ -63,9 +63,10 @@ static bool take_texture(pl_tracer *tracer, double t, pl_surface *surface, pl_er
  * transformed back). Its length is kept in range, so that no scale however deep overflows. */
 static inline void map_normal_back(const pl_transform *transform, double n[3])
 {
-    const double *m = transform->to_object.m;
+    pl_affine room;
+    const double *m = pl_transform_entries(transform, room.m);
     if (transform->form == PL_FORM_TRANSLATION) return;
-    if (transform->form == PL_FORM_GENERAL) pl_affine_normal(&transform->to_object, n, n);
+    if (transform->form <= PL_FORM_PACKED) pl_affine_normal((const pl_affine *)m, n, n);
     else
         for (int axis = 0; axis < 3; axis++) n[axis] *= m[5 * axis];
     double size = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);

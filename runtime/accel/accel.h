@@ -118,12 +118,14 @@ extern const pl_accel pl_accel_none, pl_accel_boxes, pl_accel_bvh, pl_accel_gate
 /* One step of the normative chain. The arithmetic follows the form of the map, which is a fact of its numbers. */
 static inline void pl_map_ray(const pl_transform *transform, double o[3], double d[3])
 {
-    const double *m = transform->to_object.m;
-    if (transform->form == PL_FORM_GENERAL) {
-        pl_affine_point(&transform->to_object, o, o);
-        pl_affine_vector(&transform->to_object, d, d);
+    if (transform->form <= PL_FORM_PACKED) {
+        pl_affine room;
+        const pl_affine *map = (const pl_affine *)pl_transform_entries(transform, room.m);
+        pl_affine_point(map, o, o);
+        pl_affine_vector(map, d, d);
         return;
     }
+    const double *m = transform->to_object.m;
     if (transform->form == PL_FORM_DIAGONAL)
         for (int axis = 0; axis < 3; axis++) {
             o[axis] *= m[5 * axis];

@@ -256,14 +256,15 @@ static inline int descend(pl_tracer *tracer, pl_bvh_lane *lane, uint32_t index, 
 /* One step of the normative chain (pl_map_ray): the same operations in the same order. */
 static inline __attribute__((always_inline)) void map_step(const pl_transform *transform, double4 *o, double4 *d)
 {
-    const double *m = transform->to_object.m;
-    const double4 offset = {m[3], m[7], m[11]};
-    if (transform->form == PL_FORM_GENERAL) {
+    if (transform->form <= PL_FORM_PACKED) {
+        double room[12];
+        const double *m = pl_transform_entries(transform, room);
         const double4 x = {m[0], m[4], m[8]}, y = {m[1], m[5], m[9]}, z = {m[2], m[6], m[10]};
-        *o = x * (*o)[0] + y * (*o)[1] + z * (*o)[2] + offset;
+        *o = x * (*o)[0] + y * (*o)[1] + z * (*o)[2] + (double4){m[3], m[7], m[11]};
         *d = x * (*d)[0] + y * (*d)[1] + z * (*d)[2];
     } else { /* a translation scales by 1 */
-        const double4 scale = {m[0], m[5], m[10]};
+        const double *m = transform->to_object.m;
+        const double4 scale = {m[0], m[5], m[10]}, offset = {m[3], m[7], m[11]};
         *o = *o * scale + offset;
         *d = *d * scale;
     }
@@ -432,11 +433,9 @@ static inline __attribute__((always_inline)) enum progress take(pl_tracer *trace
         if (query->done) return ENDED;
         k->t_max = local_t_max(k->f, query->t_max);
     }
-    if (++k->steps > PL_LIMIT_RAY_STEPS) {
-        pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
-        return FAILED;
-    }
-    return UNDER_WAY;
+    if (++k->steps <= PL_LIMIT_RAY_STEPS) return UNDER_WAY;
+    pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
+    return FAILED;
 }
 
 /* One ray to its end. false: an error. */

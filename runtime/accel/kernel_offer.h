@@ -41,8 +41,9 @@ static inline void store_quad(pl_lanes *rays, int first, const quad *q)
 /* pl_map_ray */
 static inline void map_quad(const pl_transform *transform, quad *q)
 {
-    const double *m = transform->to_object.m;
-    if (transform->form == PL_FORM_GENERAL) {
+    if (transform->form <= PL_FORM_PACKED) {
+        double room[12];
+        const double *m = pl_transform_entries(transform, room);
         const quad from = *q;
 #pragma GCC unroll 3
         for (int r = 0; r < 3; r++) {
@@ -52,6 +53,7 @@ static inline void map_quad(const pl_transform *transform, quad *q)
         }
         return;
     }
+    const double *m = transform->to_object.m;
 #pragma GCC unroll 3
     for (int axis = 0; axis < 3; axis++) {
         if (transform->form == PL_FORM_DIAGONAL) {

@@ -266,6 +266,53 @@ def test_what_occurs_once_needs_no_front():
     assert front["limit"] > 10_000 and front["count"] < 300
 
 
+PLACES = """camera { location <0,-9,5> look_at 0 }
+light_source { <5,-9,9> color rgb 1 }
+object { Garden }
+Selection Garden { Garden -> {terms}; }
+Selection Stone { Stone -> box + T_beside cone; }
+Transformation T_beside { trans 1.5 0 0; }
+{maps}
+"""
+# What of a map may be packed: turns about each axis, mirrors, and maps of more numbers than are packed.
+MAPS = (
+    "trans {x} {y} 0; rotz {a};",
+    "trans {x} 0 {y}; roty -{a};",
+    "rotx {a};",
+    "trans {x} {y} 1; rotz {a}; scale 0.7;",
+    "trans -{x} {y} 0; rotz 90; scale 1 -1 0.5;",
+    "trans {x} {y} 0; rotx {a}; roty {a}; rotz 30;",
+)
+
+
+def garden(count: int) -> bytes:
+    """Stones placed by maps that are computed, each in one place."""
+    terms, maps = [], []
+    for i in range(count):
+        numbers = {"x": f"{i % 9} + rand({2 * i})", "y": f"{i // 9} + rand({2 * i + 1})", "a": f"(360*rand({i}))"}
+        terms.append(f"T_{i} Stone")
+        maps.append(f"Transformation T_{i} {{ {MAPS[i % len(MAPS)].format(**numbers)} }}")
+    return PLACES.replace("{terms}", " + ".join(terms)).replace("{maps}", "\n".join(maps))
+
+
+def test_maps_that_are_packed_are_the_same_maps():
+    """Hits, normals and pictures through turned, mirrored and general places, in all accelerators."""
+    data = compile(garden(36))
+    origins, directions = rays(data, 1500, 8)
+    expected = answers(data, origins, directions, accelerator="none")
+    assert np.isfinite(expected["t"]).any()
+    for options in [{"accelerator": name} for name in ("boxes", "grid", "bvh")] + [{"isa": isa} for isa in available(data)]:
+        assert_same(answers(data, origins, directions, **options), expected, options)
+    with Scene(data, accelerator="none") as scene, Scene(data) as ours:
+        np.testing.assert_array_equal(ours.render(64, 48)["color"], scene.render(64, 48)["color"])
+
+
+def test_places_that_turn_about_an_axis_take_few_bytes():
+    """A tree of the forest is an item, a packed map and a pointer: no more than half of its map would be unpacked, besides."""
+    with Scene(compile(ROOT / "scenes" / "forest.plsys", parameters={"order": 0})) as scene:
+        assert scene.statistics["bytes"]["states"] < 10_000 * (56 + 8 + 48) + 400_000
+
+
 def test_fronts_that_do_not_fit_are_left_for_unfolding_on_touch():
     data = compile(ROOT / "scenes" / "forest.plsys", parameters={"order": 3})
     origins = np.random.default_rng(1).uniform((0, 0, 3), (300, 300, 4), (40, 3))
