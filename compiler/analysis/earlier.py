@@ -33,7 +33,13 @@ class Earlier:
     def keep(self, old: Block) -> None:
         """Remember what was read from ``old``, which is gone."""
         facts: Facts | None = old.__dict__.get("facts")
-        if facts is None or facts.syntax or facts.includes or facts.text is not old.data or len(old.data) > MOST_BYTES:
+        if (
+            facts is None
+            or facts.syntax
+            or facts.includes
+            or facts.text is not old.data
+            or len(old.data) > MOST_BYTES
+        ):
             return
         self._pop(old)
         self._facts[old.path, old.data] = facts

@@ -33,7 +33,13 @@ class Router(Diagnostics):
         self.messages = messages
 
     def add(
-        self, code: str, span: Span, message: str, hint: str = "", notes: Iterable[Note] = (), mend: str | None = None
+        self,
+        code: str,
+        span: Span,
+        message: str,
+        hint: str = "",
+        notes: Iterable[Note] = (),
+        mend: str | None = None,
     ) -> None:
         super().add(code, span, message, hint, notes, mend)
         found = self.items.pop()

@@ -14,7 +14,11 @@ from stress import rounds
 from test_retouch import SCENE, check, told
 
 # Without a mistake: only then there is much to take back.
-RIGHT = SCENE.replace("\n    ; rotx", "; rotx").replace("scale\n   ", "scale").replace("tilt ;\n}", "; rotx tilt ;\n}")
+RIGHT = (
+    SCENE.replace("\n    ; rotx", "; rotx")
+    .replace("scale\n   ", "scale")
+    .replace("tilt ;\n}", "; rotx tilt ;\n}")
+)
 LETTERS = ["x", "2", " ", "-", "{", "}", "\n", ";", "/*", "A", "Tree", "", ""]
 
 
@@ -72,7 +76,9 @@ def test_what_changed_meanwhile_is_told():
     project.edit(document, height, height + 6, b"Weight")
     project.work()
     project.edit(document, at, at + 2, b"")
-    assert any(start > RIGHT.index("T_up {") and "'Height'" in said for start, _, _, said in told(project, document))
+    assert any(
+        start > RIGHT.index("T_up {") and "'Height'" in said for start, _, _, said in told(project, document)
+    )
     check(project, document)
 
 
@@ -93,7 +99,9 @@ def test_a_text_that_comes_back_elsewhere_is_another_definition():
 def test_the_whole_scene_is_checked_as_before():
     """Messages and findings about a text that comes back are made anew."""
     project = Project()
-    document = project.open(None, b"Selection A { A -> box; }\nobject { A }\nTransformation T { scale 0; }\n", name="x")
+    document = project.open(
+        None, b"Selection A { A -> box; }\nobject { A }\nTransformation T { scale 0; }\n", name="x"
+    )
     before = told_of_all(project, document)
     at = document.text.data.index(b"scale")
     project.edit(document, at, at, b"2 ")
@@ -116,7 +124,9 @@ def test_no_more_is_kept_than_has_room(monkeypatch):
     def block(text: bytes) -> Block:
         return Block("x", text, None, Shape(True, 0, 0, False))
 
-    texts = [b"Transformation T%d { roty 9; }" % i for i in range(5)] + [b"Transformation T {%s roty 9; }" % (b" " * 100)]
+    texts = [b"Transformation T%d { roty 9; }" % i for i in range(5)] + [
+        b"Transformation T {%s roty 9; }" % (b" " * 100)
+    ]
     for text in texts:
         old = block(text)
         facts_of(old)
