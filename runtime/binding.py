@@ -126,6 +126,7 @@ class PlStatistics(ctypes.Structure):
         ("terrain_triangles", c_uint64),
         ("terrain_bytes", c_uint64),
         ("terrain_node_bytes", c_uint64),
+        ("seconds_trace_cpu", c_double),
     ]
 
 

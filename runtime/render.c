@@ -38,12 +38,13 @@ typedef struct pl_worker {
     uint8_t srgb[3]; /* … and in picture files: neighbours often are alike */
     uint16_t linear16[3];
     double first_pixel; /* when this one's first pixel was done; 0: none is */
+    double cpu;         /* seconds that its thread ran */
 } pl_worker;
 
-static double seconds(void)
+static double seconds(clockid_t clock)
 {
     struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
+    clock_gettime(clock, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
@@ -134,7 +135,7 @@ static bool render_block(pl_worker *worker, uint32_t tile, int left, int top, pl
             write_color(worker, pixel, alone);
             write_first(job->channels, pixel, &first);
         }
-    if (worker->first_pixel == 0.0) worker->first_pixel = seconds();
+    if (worker->first_pixel == 0.0) worker->first_pixel = seconds(CLOCK_MONOTONIC);
     return true;
 }
 
@@ -149,20 +150,28 @@ static bool render_tile(pl_worker *worker, uint32_t tile, pl_error *error)
     return true;
 }
 
-static void *work(void *context)
+static void render_tiles(pl_worker *worker)
 {
-    pl_worker *worker = context;
     pl_job *job = worker->job;
     const pl_render_options *options = job->options;
     for (;;) {
         const uint32_t tile = atomic_fetch_add(&job->next, 1);
         pl_error error = {.code = PL_OK};
-        if (tile >= job->tiles || is_idle(job, tile)) return NULL;
+        if (tile >= job->tiles || is_idle(job, tile)) return;
         if (!render_tile(worker, tile, &error)) fail(job, tile, &error);
         const uint32_t finished = atomic_fetch_add(&job->finished, 1) + 1;
         if (worker->reports && options->progress && !options->progress(options->context, (double)finished / job->tiles))
             atomic_store(&job->cancelled, true);
     }
+}
+
+static void *work(void *context)
+{
+    pl_worker *worker = context;
+    const double start = seconds(CLOCK_THREAD_CPUTIME_ID);
+    render_tiles(worker);
+    worker->cpu = seconds(CLOCK_THREAD_CPUTIME_ID) - start;
+    return NULL;
 }
 
 static bool check(const pl_scene *scene, const pl_render_options *options, const pl_channels *channels, pl_error *error)
@@ -203,22 +212,23 @@ static void run(pl_worker *workers, int count)
 
 static bool render(pl_scene *scene, pl_job *job, const pl_view *view, pl_error *error)
 {
-    const double start = seconds();
+    const double start = seconds(CLOCK_MONOTONIC);
     int count = pl_scene_threads(scene);
     if ((uint32_t)count > job->tiles) count = (int)job->tiles;
     pl_worker *workers = calloc((size_t)count, sizeof *workers);
     if (!workers) return pl_fail_memory(error, "preparing to render");
     bool ok = prepare(workers, count, job, view, error);
     if (ok) run(workers, count);
-    double first_pixel = INFINITY;
+    double first_pixel = INFINITY, cpu = 0.0;
     for (int i = 0; i < count; i++) {
         if (workers[i].first_pixel > 0.0) first_pixel = fmin(first_pixel, workers[i].first_pixel);
+        cpu += workers[i].cpu;
         if (workers[i].shader) pl_shader_count(workers[i].shader, scene);
         pl_sampler_destroy(workers[i].sampler);
         pl_shader_destroy(workers[i].shader);
     }
     free(workers);
-    pl_scene_count_seconds(scene, seconds() - start, first_pixel < INFINITY ? first_pixel - start : 0.0);
+    pl_scene_count_seconds(scene, seconds(CLOCK_MONOTONIC) - start, cpu, first_pixel < INFINITY ? first_pixel - start : 0.0);
     if (ok && atomic_load(&job->cancelled))
         return pl_fail(error, PL_ERROR_CANCELLED, "rendering", "stopped before the picture was complete");
     if (ok && job->error.code != PL_OK) {

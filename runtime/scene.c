@@ -404,10 +404,11 @@ void pl_scene_count(pl_scene *scene, const pl_tracer *tracer, const pl_ray_count
     pthread_mutex_unlock(&scene->lock);
 }
 
-void pl_scene_count_seconds(pl_scene *scene, double trace, double first_pixel)
+void pl_scene_count_seconds(pl_scene *scene, double trace, double cpu, double first_pixel)
 {
     pthread_mutex_lock(&scene->lock);
     scene->statistics.seconds_trace += trace;
+    scene->statistics.seconds_trace_cpu += cpu;
     scene->statistics.seconds_first_pixel = first_pixel;
     pthread_mutex_unlock(&scene->lock);
 }

@@ -299,7 +299,8 @@ class Scene:
 
         primitives (that symbols generate; None: more than 2⁶⁴, or unknown as without states), states, depth (symbols on a
         path), scene_bytes, singular (dropped subtrees), box_tests, primitive_tests, bailout, trace_level, rays {primary, shadow, reflection,
-        transmitted}, seconds {verify, build, trace, first_pixel: of the last rendering, from its start}, accelerator, threads,
+        transmitted}, seconds {verify, build, trace, trace_cpu: that its threads ran, first_pixel: of the last rendering, from
+        its start}, accelerator, threads,
         detail (the cut-off in pixels, 0: none), cut {instances: rays that ended at a cut instance's box, max_error: the
         largest error bound of their distance, in scene units}, lazy {unfolded, evicted: states, where there are too many to
         build; found: times that a ray came to one in memory; states, bytes, classes: of these in memory now}.

@@ -112,7 +112,7 @@ typedef struct pl_ray_counts {
     uint64_t primary, shadow, reflection, transmitted, bailout, trace_level;
 } pl_ray_counts;
 void pl_scene_count(pl_scene *scene, const pl_tracer *tracer, const pl_ray_counts *rays);
-/* Seconds of a rendering, and from its start to its first pixel. */
-void pl_scene_count_seconds(pl_scene *scene, double trace, double first_pixel);
+/* Seconds of a rendering, those that its threads ran, and from its start to its first pixel. */
+void pl_scene_count_seconds(pl_scene *scene, double trace, double cpu, double first_pixel);
 
 #endif

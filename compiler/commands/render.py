@@ -156,14 +156,12 @@ def run(arguments: argparse.Namespace) -> int:
         grid=arguments.grid,
         detail=arguments.detail,
     ) as scene:
-        before_trace, cpu = time.perf_counter(), time.process_time()
+        before_trace = time.perf_counter()
         image = _render(scene, arguments)
-        cpu = time.process_time() - cpu
         statistics = scene.statistics
     before_write = time.perf_counter()
     _write(arguments, image, statistics)
-    seconds |= {name: statistics["seconds"][name] for name in ("verify", "states", "build", "trace")}
-    seconds["trace_cpu"] = cpu
+    seconds |= {name: statistics["seconds"][name] for name in ("verify", "states", "build", "trace", "trace_cpu")}
     seconds["write"] = time.perf_counter() - before_write
     seconds["first_pixel"] = before_trace - started + statistics["seconds"]["first_pixel"]
     facts = render_facts.facts(arguments, statistics, seconds, left_out)

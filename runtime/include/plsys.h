@@ -151,6 +151,7 @@ typedef struct pl_statistics {
     uint64_t front_pilot_rays, front_flat_bytes;
     double front_entries, front_pilot_seconds;
     uint64_t terrain_triangles, terrain_bytes, terrain_node_bytes; /* in the tiles; of bytes_items and bytes_nodes */
+    double seconds_trace_cpu; /* that the threads of renderings ran, added up */
 } pl_statistics;
 
 PL_API void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics);
