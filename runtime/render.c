@@ -228,7 +228,8 @@ static bool render(pl_scene *scene, pl_job *job, const pl_view *view, pl_error *
         pl_shader_destroy(workers[i].shader);
     }
     free(workers);
-    pl_scene_count_seconds(scene, seconds(CLOCK_MONOTONIC) - start, cpu, first_pixel < INFINITY ? first_pixel - start : 0.0);
+    const double trace = seconds(CLOCK_MONOTONIC) - start;
+    pl_scene_count_seconds(scene, trace, cpu, first_pixel < INFINITY ? first_pixel - start : 0.0);
     if (ok && atomic_load(&job->cancelled))
         return pl_fail(error, PL_ERROR_CANCELLED, "rendering", "stopped before the picture was complete");
     if (ok && job->error.code != PL_OK) {
