@@ -147,7 +147,8 @@ def test_statistics_count_rays_and_costs(tree):
     assert statistics["rays"]["primary"] == 32 * 24 and statistics["primitives"] == 65
     assert statistics["accelerator"] == "bvh" and statistics["threads"] == 2
     assert statistics["box_tests"] > 0 and statistics["seconds"]["trace"] > 0
-    assert set(statistics["seconds"]) == {"verify", "states", "build", "trace", "first_pixel"}
+    assert set(statistics["seconds"]) == {"verify", "states", "build", "trace", "trace_cpu", "first_pixel"}
+    assert statistics["seconds"]["trace_cpu"] > 0
     assert 0 < statistics["seconds"]["first_pixel"] <= statistics["seconds"]["trace"]
 
 
