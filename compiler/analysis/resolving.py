@@ -9,10 +9,10 @@ Example: ``BlockResolver(block, Router(messages), namespace.entries, namespace.n
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Callable, Iterable
+from typing import Callable
 
 from ..reading import syntax
-from ..reading.diagnostics import Diagnostic, Diagnostics, Note
+from ..reading.diagnostics import Diagnostic, Diagnostics
 from ..reading.model import Empty, Operand
 from ..reading.resolve import Resolver
 from ..reading.resolve_names import Entry
@@ -32,22 +32,14 @@ class Router(Diagnostics):
         super().__init__()
         self.messages = messages
 
-    def add(
-        self,
-        code: str,
-        span: Span,
-        message: str,
-        hint: str = "",
-        notes: Iterable[Note] = (),
-        mend: str | None = None,
-    ) -> None:
-        super().add(code, span, message, hint, notes, mend)
-        found = self.items.pop()
-        if facts_of(span.source).is_broken:  # type: ignore[arg-type]
+    def keep(self, diagnostic: Diagnostic) -> None:
+        block: Block = diagnostic.span.source  # type: ignore[assignment]
+        if facts_of(block).is_broken:
             return
-        known = self.messages.setdefault(span.source, [])  # type: ignore[arg-type]
-        if not any((k.code, k.span.start, k.message) == (code, span.start, message) for k in known):
-            known.append(found)
+        known = self.messages.setdefault(block, [])
+        what = diagnostic.code, diagnostic.span.start, diagnostic.message
+        if not any((each.code, each.span.start, each.message) == what for each in known):
+            known.append(diagnostic)
 
 
 class BlockResolver(Resolver):

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 
 from ..reading.model import Model
+from ..reading.walk import reached_from
 from . import graph as g
 from .count import Count, count, expected, least, most
 from .explore import Exploration, explore
@@ -110,7 +111,7 @@ class _Observation:
         below: dict[int, set[int]] = {symbol: set() for symbol in self.states}
         for state, formula in self.found.formulas.items():
             below[state[0]].update(entered[0] for entered in formula.states())
-        reached = {symbol: _closure(symbol, below) for symbol in below}
+        reached = {symbol: reached_from(below[symbol], below) for symbol in below}
         return {
             symbol: frozenset({symbol, *(other for other in reached[symbol] if symbol in reached[other])})
             for symbol in below
@@ -305,17 +306,6 @@ def _kinds(trace: Trace) -> Iterator[str]:
     for pick in trace.picks:
         for _, way in pick:
             yield from _kinds(way)
-
-
-def _closure(start: int, below: dict[int, set[int]]) -> set[int]:
-    reached: set[int] = set()
-    pending = list(below[start])
-    while pending:
-        symbol = pending.pop()
-        if symbol not in reached:
-            reached.add(symbol)
-            pending.extend(below[symbol])
-    return reached
 
 
 def _size(value: Count) -> float:

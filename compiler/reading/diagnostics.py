@@ -97,7 +97,10 @@ class Diagnostics:
         mend: str | None = None,
     ) -> None:
         """Add a message; its severity is the code's. A code without a row in CODES is a KeyError."""
-        self.items.append(Diagnostic(code, CODES[code].severity, message, span, hint, tuple(notes), mend))
+        self.keep(Diagnostic(code, CODES[code].severity, message, span, hint, tuple(notes), mend))
+
+    def keep(self, diagnostic: Diagnostic) -> None:
+        self.items.append(diagnostic)
 
     @property
     def has_errors(self) -> bool:

@@ -33,6 +33,7 @@ from .resolve_names import Entry, Names, terms_of
 from .resolve_operators import Operators
 from .resolve_textures import Textures
 from .source import Span
+from .walk import reached_from
 
 OPERAND_KINDS = ("selection", "primitive")
 
@@ -221,14 +222,7 @@ class Terms:
         """The Selections that productions lead to from ``name``; itself only through a cycle."""
         if name not in self._reached:
             edges = self.edges()
-            found: set[str] = set()
-            waiting = list(edges[name])
-            while waiting:
-                other = waiting.pop()
-                if other not in found:
-                    found.add(other)
-                    waiting += edges[other]
-            self._reached[name] = frozenset(found)
+            self._reached[name] = reached_from(edges[name], edges)
         return self._reached[name]
 
     def has_same_edges(self) -> bool:

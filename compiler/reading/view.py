@@ -19,7 +19,7 @@ from .intervals import Ask, Interval, intervals_of
 from .linear import form
 from .memory import Memory
 from .model import Assign, Calculate, Enter, Expression, Model, Operator, Primitive, Production
-from .walk import Way, expressions_of, reads, seed_of, ways
+from .walk import Way, expressions_of, reached_from, reads, seed_of, ways
 
 
 class Uses(NamedTuple):
@@ -73,7 +73,8 @@ class View:
     @cached_property
     def reached(self) -> frozenset[str]:
         """The symbols that the scene's objects lead to, guards ignored."""
-        return self.ask_again(reached_from, [self.entered(placed.body) for placed in self.model.objects], self.edges)  # type: ignore[arg-type]
+        starts = {name for placed in self.model.objects for name in self.entered(placed.body)}  # type: ignore[arg-type]
+        return self.ask_again(reached_from, starts, self.edges)
 
     @cached_property
     def uses(self) -> list[Uses]:
@@ -91,17 +92,6 @@ def _writes_of(ask: Ask, *calculations: Calculate) -> dict[str, list[tuple[int, 
         for name, value in ask(constants_of, operator):
             found.setdefault(name, []).append((id(operator), value))
     return found
-
-
-def reached_from(starts: list[frozenset[str]], edges: dict[str, frozenset[str]]) -> frozenset[str]:
-    found: set[str] = set()
-    waiting = [name for names in starts for name in names]
-    while waiting:
-        name = waiting.pop()
-        if name not in found and name in edges:
-            found.add(name)
-            waiting += edges[name]
-    return frozenset(found)
 
 
 def ways_of(production: Production) -> tuple[Way, ...]:

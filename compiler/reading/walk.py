@@ -9,7 +9,7 @@ Example::
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import AbstractSet, Iterator, Mapping
+from typing import AbstractSet, Hashable, Iterable, Iterator, Mapping, TypeVar
 
 from .evaluate import NotFinite, fold
 from .model import (
@@ -31,6 +31,8 @@ from .model import (
     Sum,
     Transform,
 )
+
+T = TypeVar("T", bound=Hashable)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,3 +179,15 @@ def components(edges: Mapping[str, AbstractSet[str]]) -> list[frozenset[str]]:
                     on_stack -= members
                     found.append(frozenset(members))
     return found
+
+
+def reached_from(starts: Iterable[T], edges: Mapping[T, Iterable[T]]) -> frozenset[T]:
+    """What ``edges`` lead to from ``starts``, these included."""
+    found: set[T] = set()
+    waiting = list(starts)
+    while waiting:
+        each = waiting.pop()
+        if each not in found and each in edges:
+            found.add(each)
+            waiting.extend(edges[each])
+    return frozenset(found)

@@ -102,59 +102,63 @@ def fresh(text: str) -> list[tuple]:
     return told(scene, document)
 
 
+class Editing:
+    """A scene under the hands of a random editor, checked in rounds by one worker."""
+
+    def __init__(self, seed: int, text: str) -> None:
+        self.choices, self.text = random.Random(seed), text
+        self.project, self.worker, self.snapshot = Project(), Work(), None
+        self.document = self.project.open(None, text.encode(), name="x")
+        self.scene = self.project.scene_of(self.document)
+
+    def replace(self, at: int, old: str, new: str) -> None:
+        self.text = self.text[:at] + new + self.text[at + len(old) :]
+        self.project.edit(self.document, at, at + len(old), new.encode())
+
+    def is_checked(self, number: int) -> bool:
+        """One round; False: the next edit came first."""
+        self.scene.work()
+        snapshot = self.snapshot = Snapshot.of(self.scene, number, self.snapshot)
+        self.worker.take(snapshot.request)
+        if self.choices.random() < 0.2:
+            return False
+        self.worker.go_on(lambda answer: Result(snapshot, answer).apply())
+        return True
+
+    def expect_a_fresh_start_s_messages(self) -> None:
+        found, expected = told(self.scene, self.document), fresh(self.text)
+        if any(severity == "error" for severity, *_ in expected):
+            found, expected = ([each for each in every if each[1] not in UNSURE] for every in (found, expected))
+        assert found == expected
+
+
 @pytest.mark.parametrize("seed", range(24))
 def test_what_is_kept_says_what_a_fresh_start_says(seed):
-    choices, text = random.Random(seed), SCENE
-    project, work, before = Project(), Work(), None
-    document = project.open(None, text.encode(), name="x")
-    scene = project.scene_of(document)
+    editing = Editing(seed, SCENE)
     for number in range(12):
-        for _ in range(choices.choice((0, 1, 1, 1, 2))):
-            at, old, new = exchanged(choices, text)
-            text = text[:at] + new + text[at + len(old) :]
-            project.edit(document, at, at + len(old), new.encode())
-        scene.work()
-        before = snapshot = Snapshot.of(scene, number, before)
-        work.take(snapshot.request)
-        if choices.random() < 0.2:
-            continue  # the next edit came first
-        work.go_on(lambda answer: Result(snapshot, answer).apply())
-        if not any(facts_of(block).is_broken for block in document.text.blocks):  # what was there before it broke is remembered
-            found, expected = told(scene, document), fresh(text)
-            if any(severity == "error" for severity, *_ in expected):
-                found, expected = ([each for each in every if each[1] not in UNSURE] for every in (found, expected))
-            assert found == expected
+        for _ in range(editing.choices.choice((0, 1, 1, 1, 2))):
+            editing.replace(*exchanged(editing.choices, editing.text))
+        # Where a block is broken, what was there before is remembered.
+        if editing.is_checked(number) and not any(facts_of(block).is_broken for block in editing.document.text.blocks):
+            editing.expect_a_fresh_start_s_messages()
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_definitions_are_exchanged_as_if_all_were_resolved(seed):
-    choices, text = random.Random(seed), SPARE
-    project, work, before = Project(), Work(), None
-    document = project.open(None, text.encode(), name="x")
-    scene = project.scene_of(document)
-    done: list[tuple[str, str]] = []
+    editing = Editing(seed, SPARE)
+    choices, done = editing.choices, []
     for number in range(16):
         for _ in range(choices.choice((1, 1, 1, 2))):
+            text = editing.text
             if done and choices.random() < 0.6:
                 new, old = done.pop()
             else:
                 old, new = choices.choice([pair for pair in WITHIN if text.count(pair[0]) > text.count(pair[1]) * (pair[0] in pair[1])])
                 done.append((old, new))
-            at = text.find(old)
-            if at < 0:
-                continue  # another edit is in its place
-            text = text[:at] + new + text[at + len(old) :]
-            project.edit(document, at, at + len(old), new.encode())
-        scene.work()
-        before = snapshot = Snapshot.of(scene, number, before)
-        work.take(snapshot.request)
-        if choices.random() < 0.2:
-            continue  # the next edit came first
-        work.go_on(lambda answer: Result(snapshot, answer).apply())
-        found, expected = told(scene, document), fresh(text)
-        if any(severity == "error" for severity, *_ in expected):
-            found, expected = ([each for each in every if each[1] not in UNSURE] for every in (found, expected))
-        assert found == expected
+            if (at := text.find(old)) >= 0:  # else another edit is in its place
+                editing.replace(at, old, new)
+        if editing.is_checked(number):
+            editing.expect_a_fresh_start_s_messages()
 
 
 def test_an_edit_within_a_definition_leaves_the_namespace_alone(monkeypatch):

@@ -156,14 +156,20 @@ def test_a_letter_in_a_name_keeps_the_rest():
     check(project, document)
 
 
-def test_a_name_in_a_file_of_two_scenes_is_read_anew(tmp_path):
+def library_of_two_scenes(folder):
+    """A project, and in it a library that two scenes include."""
     for name in ("one", "two"):
-        (tmp_path / f"{name}.plsys").write_text('#include "library.plsys"\nobject { Tree }\n')
-    (tmp_path / "library.plsys").write_text("Selection Tree { Tree -> T_up sphere; }\nTransformation T_up { trans 0 0 1; }\n")
+        (folder / f"{name}.plsys").write_text('#include "library.plsys"\nobject { Tree }\n')
+    (folder / "library.plsys").write_text("Selection Tree { Tree -> T_up sphere; }\nTransformation T_up { trans 0 0 1; }\n")
     project = Project()
-    documents = [project.open(path, path.read_bytes()) for path in sorted(tmp_path.glob("*.plsys"))]
+    documents = [project.open(path, path.read_bytes()) for path in sorted(folder.glob("*.plsys"))]
     library = next(each for each in documents if each.path.stem == "library")
     project.work()
+    return project, library
+
+
+def test_a_name_in_a_file_of_two_scenes_is_read_anew(tmp_path):
+    project, library = library_of_two_scenes(tmp_path)
     assert len(library.scenes) == 2
     at = library.text.data.index(b"T_up sphere")
     project.edit(library, at, at, b"x")
@@ -186,13 +192,7 @@ def test_what_a_wrong_name_hid_is_told_when_the_name_is_right():
 
 
 def test_what_a_library_no_longer_defines_is_gone_in_all_its_scenes(tmp_path):
-    for name in ("one", "two"):
-        (tmp_path / f"{name}.plsys").write_text('#include "library.plsys"\nobject { Tree }\n')
-    (tmp_path / "library.plsys").write_text("Selection Tree { Tree -> T_up sphere; }\nTransformation T_up { trans 0 0 1; }\n")
-    project = Project()
-    documents = [project.open(path, path.read_bytes()) for path in sorted(tmp_path.glob("*.plsys"))]
-    library = next(each for each in documents if each.path.stem == "library")
-    project.work()
+    project, library = library_of_two_scenes(tmp_path)
     at = library.text.data.index(b"T_up {")
     for _ in range(2):  # the second time, what the first one gave is to be forgotten
         project.edit(library, at, at, b"x")
