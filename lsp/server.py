@@ -35,8 +35,9 @@ MANY_OBJECTS = 50_000
 SWITCH_S = 0.0002
 INPUT_BUFFER_BYTES = 1 << 18
 
-# Whole-file checks begin when nothing was typed for so long: their snapshot costs some milliseconds.
-PAUSE_S = 0.1
+# Whole-file checks begin when nothing was typed for so long: their snapshot costs some milliseconds. A key that is held
+# down comes again after 33 ms, and that is all one burst.
+PAUSE_S = 0.05
 # When a pause is looked for again where something was to do just then.
 BUSY_S = 0.005
 
@@ -100,14 +101,14 @@ class Dispatcher:
             self._handle(self.inbox.popleft())
         elif self.session.has_work:
             self.session.work()
-            if gc.get_count()[0] > MANY_OBJECTS and gc.isenabled():
-                gc.freeze()  # what the checks found, mostly
             if self._has_opened and not self.session.has_work:
                 # A large file is many objects that stay; searching them for garbage takes longer than a key may.
                 gc.freeze()
                 gc.enable()
                 self._has_opened = False
             self._await_pause()
+        if gc.get_count()[0] > MANY_OBJECTS and gc.isenabled():
+            gc.freeze()  # what the checks found, or what is kept of answers
         if self.session.exit_code is not None:
             self.leave()
         elif self.is_busy:

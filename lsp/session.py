@@ -369,7 +369,7 @@ class Session:
 
     def prepare(self) -> bool:
         """Do for a moment, in a pause, what a request would have to wait for; whether nothing is left of that."""
-        deadline = Deadline(SLICE, self._is_message_waiting)
+        deadline = Deadline(SLICE, lambda: self._is_message_waiting() or bool(self._arrived))
         return self.has_work or all(prepare_format(document, deadline) for document in list(self.workspace.uris))
 
     def _later(self, take: Callable[[Any], None], what: Any) -> None:

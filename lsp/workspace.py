@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import logging
 import os
+from itertools import groupby
 from pathlib import Path
 from typing import Iterable, Iterator
 from urllib.parse import quote, unquote, urlsplit
@@ -152,6 +153,14 @@ class Workspace:
     def location(self, place: Place) -> dict:
         """The protocol's Location of ``place``."""
         return {"uri": self.uri(place.document), "range": self.range(place)}
+
+    def locations(self, places: Iterable[Place]) -> list[dict]:
+        """The Locations of many places, those of a file together."""
+        found: list[dict] = []
+        for document, several in groupby(places, lambda place: place.document):
+            uri, range_ = self.uri(document), self.positions(document).range
+            found += [{"uri": uri, "range": range_(place.start, place.end)} for place in several]
+        return found
 
     # --- diagnostics
 

@@ -287,8 +287,8 @@ def _predict(outcome: Outcome, interruption: Interruption) -> None:
             found = insights(outcome.model)
             outcome.insights = found
             outcome.forecast = forecast(build_graph(outcome.model, is_verified=False))
-    except Interrupted:
-        outcome.insights = None
+    except Interrupted as broken_off:
+        outcome.insights, interruption.left = None, broken_off
         return
     except (PlsysError, RecursionError):
         outcome.model, outcome.is_news = None, True
@@ -318,6 +318,7 @@ def main() -> None:
     def send(answer: Answer) -> None:
         output.write(pickle.dumps(answer))
         output.flush()
+        work.interruption.left = None
         _tidy()
 
     gc.disable()

@@ -24,8 +24,12 @@ class Interrupted(Exception):
 
 
 class Interruption:
+    """``left`` is what was broken off last: whoever catches it may keep it, as letting go of all that was made takes longer
+    than the news should wait."""
+
     def __init__(self) -> None:
         self._is_allowed = False
+        self.left: Interrupted | None = None
 
     @contextmanager
     def allowed(self) -> Iterator[None]:

@@ -69,7 +69,7 @@ class Kept:
             model, said = resolver.model, resolver.diagnostics.items
             model.source = root
             found.items += [each for several in self._syntax.values() for each in several]
-            if self.meanings is not None and not said and not found.has_errors and model.objects:
+            if self.meanings is not None and not resolver.diagnostics.has_errors and not found.has_errors and model.objects:
                 self._resolver = resolver
             found.items += said
             return model
@@ -79,6 +79,8 @@ class Kept:
 
     def _exchange(self, resolver: Resolver, gone: set[Block], due: list[Block], order: dict[Block, int]) -> bool:
         names = frozenset().union(*(role_of(block).names for block in due))
+        said = resolver.diagnostics.items
+        said[:] = [each for each in said if each.span.source not in gone]
         if not resolve_again(resolver, [facts_of(block).file for block in due], gone, names, order):
             return False
         for block in gone:

@@ -393,16 +393,21 @@ class Scene:
 
     def uses(self, name: str) -> list[Place]:
         """Every occurrence of the scene's own ``name``, with its role, in all files, in reading order."""
-        places: list[Place] = []
+        numbers = {document.text.name: i for i, document in enumerate(self.documents)}
+        using: list[tuple[int, int, Facts]] = []
         for facts in self.users.get(name, ()):
-            block = facts.block
-            document = self.document_of(block)
-            if document is not None:
-                base = document.text.start_of(block)
-                found = [each for each in facts.names if each.name == name]
-                places += [Place(document, base + each.start, base + each.end, each.role) for each in found]
-        number = {document: i for i, document in enumerate(self.documents)}
-        return sorted(places, key=lambda place: (number[place.document], place.start))
+            number = numbers.get(facts.block.name)
+            index = None if number is None else self.documents[number].text.order.get(facts.block)
+            if index is not None:
+                using.append((number, index, facts))
+        places: list[Place] = []
+        for number, index, facts in sorted(using, key=lambda each: each[:2]):
+            document = self.documents[number]
+            base = document.text.start_at(index)
+            places += [
+                Place(document, base + each.start, base + each.end, each.role) for each in facts.names if each.name == name
+            ]
+        return places
 
     def documents_with(self, name: str) -> set[Document]:
         """The files in which ``name`` stands."""

@@ -32,8 +32,8 @@ def check(model: Model, diagnostics: Diagnostics, memory: Memory | None = None) 
     view = View(model, memory or Memory())
     _check_scene(model, diagnostics)
     check_values(view, diagnostics)
-    for symbol in model.symbols.values():
-        diagnostics.items += view.ask(outcomes_of, symbol, given=(view.seed,))
+    for found in view.of_each(outcomes_of, view.symbols):
+        diagnostics.items += found
     if not diagnostics.has_errors:
         check_paths(view, diagnostics)
         check_recursion(view, diagnostics)
@@ -92,9 +92,11 @@ def _check_unused(view: View, diagnostics: Diagnostics) -> None:
     """Definitions of the scene's own file that nothing uses. (Included files are libraries.)"""
     model, read = view.model, _read_parameters(view)
     own = model.source.name
-    for name, definition in model.definitions.items():
-        if definition.references and definition.kind not in ("parameter", "selection"):
-            continue  # nearly all of a scene: the rest of the loop runs for few
+    named = ("parameter", "selection")
+    # Nearly all of a large scene goes here, so that the loop runs for few.
+    suspects = [each for each in model.definitions.values() if not each.references or each.kind in named]
+    for definition in suspects:
+        name = definition.name
         if definition.span.source.name != own:
             continue
         if definition.kind == "parameter":
@@ -111,7 +113,7 @@ def _check_unused(view: View, diagnostics: Diagnostics) -> None:
 def _read_parameters(view: View) -> frozenset[str]:
     """The parameters that something reads, their own updates apart; those of operators that nothing uses count
     as read, since the operators themselves are reported."""
-    read = view.ask_again(_union, [view.ask_in_turn(read_by, production) for production in view.productions])
+    read = view.ask_again(_union, view.of_productions(read_by, in_turn=True))
     return read.union(name for name in view.model.parameters if name not in view.writes)
 
 

@@ -14,7 +14,7 @@ from bisect import bisect_left, insort
 
 from .diagnostics import Diagnostic, Diagnostics
 from .evaluate import NotFinite, fold
-from .intervals import ALL, Interval, is_number
+from .intervals import ALL, Interval, is_number, known_of
 from .model import Apply, Branch, Constant, Expression, Production, Read, Symbol
 from .source import Span
 from .view import View, guards_read
@@ -41,13 +41,22 @@ def check_guards(view: View, diagnostics: Diagnostics) -> None:
     told: dict[int, list[int]] = {}  # where messages start, by file
     for item in diagnostics.items:
         insort(told.setdefault(id(item.span.source), []), item.span.start)
-    for symbol in view.model.symbols.values():
-        diagnostics.items += view.ask(ruled_out, symbol, given=(view.seed,))
-        if not _has_any(told.get(id(symbol.span.source), []), symbol.span):
-            names = view.ask(guards_read, symbol.production)
-            known = tuple((name, view.intervals[name]) for name in names if view.intervals.get(name, ALL) != ALL)
-            if known:
-                diagnostics.items += view.ask(decided_by_assignments, symbol, given=(view.seed, known))
+    for found in view.of_each(ruled_out, view.symbols):
+        diagnostics.items += found
+    known = view.ask_again(intervals_in_guards, view.of_productions(guards_read), view.intervals)
+    limited = [
+        (symbol, limits)
+        for symbol, limits in zip(view.symbols, known[len(view.model.objects) :])
+        if limits and not _has_any(told.get(id(symbol.span.source), []), symbol.span)
+    ]
+    if limited:
+        for found in view.of_each(decided_by_assignments, *map(list, zip(*limited))):
+            diagnostics.items += found
+
+
+def intervals_in_guards(several: list[tuple[str, ...]], intervals: Intervals) -> list[tuple[tuple[str, Interval], ...]]:
+    """Where the values of the parameters lie that productions' guards read."""
+    return [known_of(names, intervals) for names in several]
 
 
 def ruled_out(symbol: Symbol, seed: float) -> list[Diagnostic]:

@@ -46,8 +46,8 @@ class Flow(NamedTuple):
 
 def check_paths(view: View, diagnostics: Diagnostics) -> None:
     """Report reads before assignment, each place once."""
-    flows = {name: view.ask(flow_of, symbol.production) for name, symbol in view.model.symbols.items()}
-    placed = [view.ask(flow_of, each.body) for each in view.model.objects]
+    every, count = view.of_productions(flow_of), len(view.model.objects)
+    placed, flows = every[:count], dict(zip(view.model.symbols, every[count:]))
     reporter = _Reporter(view, diagnostics)
     for each, flow in zip(view.model.objects, placed):
         if flow.exposed:

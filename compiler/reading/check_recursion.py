@@ -37,30 +37,42 @@ from .model import (
 from .view import View, guards_read
 from .walk import Way, components, decided, draws, is_open, leaves, ways
 
+# The ids of the operators on the ways round a recursion, and the parameters in its guards.
+Needs = tuple[frozenset[int], tuple[str, ...]]
+
 # Guards that stay true for ever when their left side moves this way.
 UNBOUNDED = {"greater": 1, "greater_equal": 1, "less": -1, "less_equal": -1}
 
 
 def check_recursion(view: View, diagnostics: Diagnostics) -> None:
     """Report on the recursions that the scene's objects lead to."""
-    reached = {name: symbol for name, symbol in view.model.symbols.items() if name in view.reached}
-    edges = {name: view.edges[name] for name in reached}
-    endless = view.ask_again(_endless, edges, {
-        name: view.ask(endings, symbol.production, given=(view.seed,)) for name, symbol in reached.items()
-    })  # fmt: skip
-    for names in view.ask_again(_recursions, edges):
-        members = [reached[name] for name in names]
+    symbols = view.model.symbols
+    edges = {name: ends for name, ends in view.edges.items() if name in view.reached}
+    ways_to_end = view.of_each(endings, [symbols[name].production for name in edges])
+    endless = view.ask_again(_endless, edges, dict(zip(edges, ways_to_end)))
+    recursions = view.ask_again(_recursions, edges)
+    own = _said_of_own_cycles(view, [symbols[names[0]] for names in recursions if len(names) == 1 and names[0] not in endless])
+    for names in recursions:
+        members = [symbols[name] for name in names]
         if not endless.isdisjoint(names):
             diagnostics.items += view.ask(said_of_endless, *members, given=(view.seed,))
+        elif len(members) == 1:
+            diagnostics.items += own[names[0]]
         else:
-            given = view.seed, _starts_of(view, members)
-            diagnostics.items += view.ask(said_of_cycle, *members, given=given)
+            (starts,) = values_at_entry([view.ask(needs_of, *members, given=(view.seed,))], view.writes)
+            diagnostics.items += view.ask(said_of_cycle, *members, given=(view.seed, starts))
 
 
-def _starts_of(view: View, members: list[Symbol]) -> Values:
-    """What parameters in the guards of a recursion have where it is entered: all that it needs to know of the scene."""
-    inside, names = view.ask(needs_of, *members, given=(view.seed,))
-    return tuple((name, starts_of(view, name, inside)) for name in names)
+def _said_of_own_cycles(view: View, symbols: list[Symbol]) -> dict[str, list[Diagnostic]]:
+    """Of symbols that enter themselves and may end: nearly all recursions of a large scene."""
+    starts = view.ask_again(values_at_entry, view.of_each(needs_of, symbols), view.writes)
+    said = view.of_each(said_of_cycle, symbols, starts)
+    return {symbol.name: each for symbol, each in zip(symbols, said)}
+
+
+def values_at_entry(needs: list[Needs], writes: dict[str, list[tuple[int, float | None]]]) -> list[Values]:
+    """What parameters in the guards of recursions have where they are entered: all that these need to know of the scene."""
+    return [tuple((name, starts_of(writes, name, inside)) for name in names) for inside, names in needs]
 
 
 # --- questions
@@ -85,8 +97,8 @@ def said_of_cycle(*given: Any) -> list[Diagnostic]:
     return diagnostics.items
 
 
-def needs_of(*given: Any) -> tuple[frozenset[int], tuple[str, ...]]:
-    """The ids of the operators on the ways round, and the parameters in guards."""
+def needs_of(*given: Any) -> Needs:
+    """What a recursion needs to know of the scene."""
     *members, seed = given
     inside = frozenset(id(operator) for _, way in _ways_back(members, seed) for operator in way.operators)
     return inside, tuple(sorted({name for symbol in members for name in guards_read(symbol.production)}))

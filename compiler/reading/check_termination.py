@@ -17,7 +17,6 @@ from .check_scaling import Back, linear_map
 from .diagnostics import Diagnostics
 from .linear import NOTHING, Form, after, difference, form
 from .model import Apply, Enter, Expression, Read
-from .view import View
 from .walk import Way, components, draws
 
 # What parameters have where a recursion is entered, by name.
@@ -204,9 +203,12 @@ class Starts(NamedTuple):
         return self.values.get(name)
 
 
-def starts_of(view: View, name: str, inside: frozenset[int]) -> tuple[float, ...] | None:
-    """What operators assign to a parameter, but for those ``inside`` (by their ids); None unless it is all constant."""
-    values = [value for operator, value in view.writes.get(name, ()) if operator not in inside]
+def starts_of(
+    writes: dict[str, list[tuple[int, float | None]]], name: str, inside: frozenset[int]
+) -> tuple[float, ...] | None:
+    """What operators assign to a parameter (view.View.writes), but for those ``inside`` (by their ids); None unless it is all
+    constant."""
+    values = [value for operator, value in writes.get(name, ()) if operator not in inside]
     return tuple(values) if values and None not in values else None  # type: ignore[arg-type]
 
 

@@ -15,7 +15,7 @@ from typing import Iterable, Iterator, NamedTuple
 from . import affine
 from .diagnostics import Diagnostic, Diagnostics
 from .evaluate import NotFinite, fold
-from .intervals import ALL, Ask, Interval, interval_of
+from .intervals import ALL, Ask, Interval, interval_of, known_of
 from .model import Apply, Assign, Calculate, Constant, Expression, Operator, Production, Read, Step, Transform
 from .source import Span
 from .view import View, operators_in, own_expressions
@@ -64,19 +64,22 @@ def _identity(message: Diagnostic) -> tuple:
 
 
 def _messages(view: View) -> Iterator[Diagnostic]:
-    every = [view.ask_in_turn(said_by, production, given=(view.seed,)) for production in view.productions]
+    every = view.of_each(said_by, view.productions, in_turn=True)
     in_radians: dict[str, list[Span]] = {}
     for said in every:
         for name, span in said.in_radians:
             in_radians.setdefault(name, []).append(span)
-    for production, said in zip(view.productions, every):
+    for said in every:
         yield from said.messages
         for operation, name in said.angles if in_radians else ():
             for span in in_radians.get(name, ()):
                 yield _in_radians(span, f"{operation} takes degrees, and '{name}' looks like radians")
-        if said.reads:
-            known = tuple((name, view.intervals[name]) for name in said.reads if name in view.intervals)
-            yield from view.ask_in_turn(settled_by, production, given=(view.seed, known))
+    undecided = [(production, said.reads) for production, said in zip(view.productions, every) if said.reads]
+    if undecided:
+        productions, several = map(list, zip(*undecided))
+        known = view.ask_again(intervals_in_steps, several, view.intervals)
+        for found in view.of_each(settled_by, productions, known, in_turn=True):
+            yield from found
 
 
 # --- questions
@@ -130,6 +133,11 @@ def steps_said(operator: Transform, seed: float) -> Steps:
         else:
             undecided.append((step, values))
     return Steps(messages, tuple(undecided), tuple(angles))
+
+
+def intervals_in_steps(several: list[tuple[str, ...]], intervals: Intervals) -> list[tuple[tuple[str, Interval], ...]]:
+    """Where the values of the parameters lie that productions' steps read."""
+    return [known_of(names, intervals) for names in several]
 
 
 def settled_by(ask: Ask, production: Production, seed: float, known: tuple[tuple[str, Interval], ...]) -> list[Diagnostic]:

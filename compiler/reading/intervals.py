@@ -116,6 +116,11 @@ def joined_intervals(*given: Assign | tuple[str, Interval]) -> dict[str, Interva
     return found
 
 
+def known_of(names: Iterable[str], intervals: dict[str, Interval]) -> tuple[tuple[str, Interval], ...]:
+    """The intervals of some parameters, as far as they say anything."""
+    return tuple((name, intervals[name]) for name in names if intervals.get(name, ALL) != ALL)
+
+
 def is_number(constant: Constant) -> bool:
     """Whether it stands there as a number (or as ++ and --, which add 1), and isn't the value of a name."""
     return constant.span is None or _NUMBER.fullmatch(constant.span.text) is not None

@@ -15,7 +15,7 @@ Example::
 
 from __future__ import annotations
 
-from typing import Any, Callable, Hashable
+from typing import Any, Callable, Hashable, Sequence
 
 
 class Memory:
@@ -23,6 +23,7 @@ class Memory:
         self._known: dict[tuple, tuple[tuple, Any]] = {}
         self._asked: dict[tuple, tuple[tuple, Any]] | None = {}  # in this round; None in most rounds
         self._last: dict[Callable[..., Any], tuple[Any, Any]] = {}
+        self._each: dict[Callable[..., Any], tuple[list, list, list]] = {}
         self._most = 0  # answers, before it is noted again which are asked for
 
     def ask(self, question: Callable[..., Any], *nodes: object, given: tuple[Hashable, ...] = ()) -> Any:
@@ -45,6 +46,23 @@ class Memory:
         if self._asked is not None:
             self._asked[key] = found
         return found[1]
+
+    def ask_each(
+        self, question: Callable[..., Any], nodes: list[Any], given: Sequence[tuple], in_turn: bool = False
+    ) -> list[Any]:
+        """The answers of ``ask`` (or ``ask_in_turn``) for each of many ``nodes`` with what is ``given`` for it. After an edit
+        nearly all are those of the last time, in the same places: these aren't even looked up."""
+        ask = self.ask_in_turn if in_turn else self.ask
+        before, known, answers = self._each.get(question, ((), (), []))
+        if len(before) != len(nodes) or self._asked is not None:
+            answers = [ask(question, node, given=each) for node, each in zip(nodes, given)]
+        else:
+            answers = answers.copy()
+            pairs = enumerate(zip(nodes, before, given, known))
+            for i in [i for i, (node, old, each, other) in pairs if node is not old or each != other]:
+                answers[i] = ask(question, nodes[i], given=given[i])
+        self._each[question] = nodes, list(given), answers
+        return answers
 
     def ask_again(self, question: Callable[..., Any], *values: Any) -> Any:
         """``question(*values)``, worked out where the values aren't equal to those of the last time: for what goes through a

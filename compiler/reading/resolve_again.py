@@ -28,7 +28,7 @@ def resolve_again(
     """Bring ``resolver.model`` up to date with ``files``, each all of a source, in the text's order. ``gone`` are the sources that
     they replace, ``names`` all that stand there; ``order`` numbers the sources of the scene. The meanings of ``gone`` were
     forgotten before. False, with nothing changed, where the whole scene has to be resolved. Messages are added to
-    the resolver's diagnostics: where there are any, it can't be used again."""
+    the resolver's diagnostics: where there are errors, it can't be used again."""
     nodes = [node for file in files for node in file.definitions]
     if resolver.model.meshes or not all(_fits(resolver, node) for node in nodes):
         return False

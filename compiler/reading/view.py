@@ -13,7 +13,7 @@ Example::
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, Callable, NamedTuple
 
 from .intervals import Ask, Interval, intervals_of
 from .linear import form
@@ -34,25 +34,33 @@ class View:
     def __init__(self, model: Model, memory: Memory) -> None:
         self.model, self.seed = model, seed_of(model)
         self.ask, self.ask_in_turn, self.ask_again = memory.ask, memory.ask_in_turn, memory.ask_again
+        self._ask_each = memory.ask_each
+        self.symbols = list(model.symbols.values())
         self.productions: list[Production] = [placed.body for placed in model.objects]  # type: ignore[misc]
-        self.productions += [symbol.production for symbol in model.symbols.values()]
+        self.productions += [symbol.production for symbol in self.symbols]
+
+    def of_each(self, question: Callable[..., Any], nodes: list, given: list | None = None, in_turn: bool = False) -> list:
+        """Memory.ask_each with the seed, and with what is ``given`` for each where there is more."""
+        seed = self.seed
+        several = [(seed,)] * len(nodes) if given is None else [(seed, each) for each in given]
+        return self._ask_each(question, nodes, several, in_turn)
+
+    def of_productions(self, question: Callable[..., Any], in_turn: bool = False) -> list:
+        """What a question that needs no seed comes to for all productions, those of objects first."""
+        return self._ask_each(question, self.productions, [()] * len(self.productions), in_turn)
 
     def ways(self, production: Production) -> tuple[Way, ...]:
         return self.ask(ways_of, production)
 
-    def entered(self, production: Production) -> frozenset[str]:
-        """The symbols that a production leads to."""
-        return self.ask(entered_by, production)
-
     @cached_property
     def operators(self) -> list[Operator]:
         """Every operator of the scene, each once."""
-        found = {id(each): each for production in self.productions for each in self.ask(operators_in, production)}
+        found = {id(each): each for several in self.of_productions(operators_in) for each in several}
         return list(found.values())
 
     @cached_property
     def calculations(self) -> list[Calculate]:
-        found = {id(each): each for production in self.productions for each in self.ask(calculations_in, production)}
+        found = {id(each): each for several in self.of_productions(calculations_in) for each in several}
         return list(found.values())
 
     @cached_property
@@ -66,14 +74,19 @@ class View:
         return self.ask_in_turn(intervals_of, *self.calculations)
 
     @cached_property
+    def entered(self) -> list[frozenset[str]]:
+        """The symbols that each production leads to."""
+        return self.of_productions(entered_by)
+
+    @cached_property
     def edges(self) -> dict[str, frozenset[str]]:
         """The symbols that each symbol leads to."""
-        return {name: self.entered(symbol.production) for name, symbol in self.model.symbols.items()}
+        return dict(zip(self.model.symbols, self.entered[len(self.model.objects) :]))
 
     @cached_property
     def reached(self) -> frozenset[str]:
         """The symbols that the scene's objects lead to, guards ignored."""
-        starts = {name for placed in self.model.objects for name in self.entered(placed.body)}  # type: ignore[arg-type]
+        starts = frozenset().union(*self.entered[: len(self.model.objects)])
         return self.ask_again(reached_from, starts, self.edges)
 
     @cached_property

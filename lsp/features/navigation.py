@@ -38,7 +38,7 @@ def references(request: Request) -> list[dict[str, Any]]:
     declarations = request.params.get("context", {}).get("includeDeclaration", True)
     scenes = request.workspace.project.scenes_with(found[0], request.document)
     places = dict.fromkeys(place for scene in scenes for place in scene.uses(found[0]))
-    return [request.location(place) for place in places if declarations or place.role != "definition"]
+    return request.workspace.locations(place for place in places if declarations or place.role != "definition")
 
 
 def highlights(request: Request) -> list[dict[str, Any]]:

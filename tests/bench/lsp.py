@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.lsp.client import Client  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
-PAUSE_MS = 100  # whole-file checks begin when nothing was typed for so long
+PAUSE_MS = 50  # whole-file checks begin when nothing was typed for so long
 
 BUDGETS_MS = {
     "start → ready": 1000,
