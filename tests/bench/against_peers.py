@@ -152,6 +152,32 @@ def menger(bench: Bench) -> None:
     )  # fmt: skip
 
 
+def residency(bench: Bench) -> None:
+    """Embree's flat scene as it grows beyond the caches, where ours stays: Menger 3 to 5, trees of order 14 to 22."""
+    if bench.quick:
+        return bench.results.note("residency", "left out: the largest flat scenes take Embree minutes and gigabytes")
+    beyond = {"coherent": 1.1, "random": 3.0}
+    for name, scene, parameter, values, kind, flat in (
+        ("Menger", "menger", "level", (3, 4, 5), QUADS, lambda case: box_quads(case.unfolded()[1])),
+        ("order", "tree", "order", (14, 16, 18, 20, 22), CURVES, curves_of),
+    ):
+        points = []
+        for value in values:
+            case = Case(f"{name} {value}", scene, {parameter: value}, bench.folder)
+            path = write_embree(case.folder / "flat.bin", [(kind, flat(case))], [])
+            last = against_embree(
+                bench, case, path, {}, beyond if case.name == "Menger 5" else {}, "of Embree flat, by size of scene"
+            )
+            path.unlink()
+            if last:
+                mine, theirs = last
+                points.append(
+                    {"bytes": mine["scene_bytes"], "embree_bytes": theirs["bytes"]}
+                    | {n: rate(mine, n) / rate(theirs, n, "single") for n in SETS}
+                )
+        bench.results.curves[f"residency: {name}"] = points
+
+
 def forest(bench: Bench) -> None:
     """10,000 trees of 32 kinds against Embree with two levels of instances."""
     case = Case("forest", "forest", {}, bench.folder)

@@ -1,6 +1,6 @@
 """Measures plsys, POV-Ray, Embree and Mitsuba 3 side by side: same rays, same machine, one run.
 
-    make bench                          everything, about 20 minutes
+    make bench                          everything, about 10 minutes
     make bench QUICK=1                  one round, without what takes minutes
     make bench ONLY=scatter,menger
 

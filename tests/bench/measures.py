@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from against_peers import fern, figure, forest, menger, order20, terrain
+from against_peers import fern, figure, forest, menger, order20, residency, terrain
 from own_curves import fronts, growth, scatter, threads
 from whole_process import split_by_hand, start, unique
 
@@ -11,6 +11,7 @@ MEASURES = {
     "figure": figure,
     "order20": order20,
     "menger": menger,
+    "residency": residency,
     "forest": forest,
     "unique": unique,
     "fern": fern,

@@ -115,6 +115,7 @@ class Results:
 PANELS = {
     "fronts": ("Memory for time: items a front", "MB", "Mray/s, one core", True),
     "growth": ("Growth: Menger 2 to 10, coherent rays", "primitives", "", True),
+    "residency": ("The flat scene leaves the caches", "Embree's MB", "ours : Embree's rate", True),
     "threads": ("Threads", "threads", "Mray/s", False),
 }
 
@@ -129,6 +130,9 @@ def lines_of(name: str, points: list[dict]):
     if name.startswith("fronts"):
         for key, style in (("coherent", "o-"), ("random", "s--")):
             yield f"{short}, {key}", style, column("bytes", 1e-6), column(key)
+    elif name.startswith("residency"):
+        for key, style in (("coherent", "o-"), ("random", "s--")):
+            yield f"{short}, {key}", style, column("embree_bytes", 1e-6), column(key)
     elif name.startswith("growth"):
         yield "memory, MB", "o-", column("primitives"), column("bytes", 1e-6)
         yield "build, s", "s--", column("primitives"), column("build_seconds")
