@@ -359,6 +359,13 @@ typedef struct walk {
 
 enum progress { FAILED = -1, ENDED, UNDER_WAY };
 
+/* One more step that isn't a node. false: too many. */
+static inline bool count_step(walk *k)
+{
+    if (__builtin_expect(++k->steps <= PL_LIMIT_RAY_STEPS, 1)) return true;
+    return pl_query_fail_steps(k->query, PL_LIMIT_RAY_STEPS);
+}
+
 static inline void look(walk *k, uint32_t frame, float t_max)
 {
     k->frame = frame;
@@ -401,41 +408,54 @@ static inline bool set_off(walk *k, pl_bvh_lane *lane, pl_query *query, uint32_t
     return begin(k, met);
 }
 
+/* The end of a frame. */
+static inline enum progress go_back(walk *k)
+{
+    if (k->frame == k->base) return ENDED;
+    look(k, k->frame - 1, local_t_max(k->f - 1, k->query->t_max));
+    return UNDER_WAY;
+}
+
+/* An instance, and what it begins with. */
+static inline __attribute__((always_inline)) enum progress go_into(pl_tracer *tracer, walk *k, uint32_t instance)
+{
+    float t_max = k->t_max;
+    const int entered = descend(tracer, k->lane, k->frame, instance, k->query, &t_max);
+    if (entered < 0) return FAILED;
+    if (entered == 0) t_max = k->t_max;
+    look(k, k->frame + (entered > 0), t_max);
+    if (entered == 0) return UNDER_WAY;
+    return begin(k, entered == 1) && count_step(k) ? UNDER_WAY : FAILED;
+}
+
+/* Whether a primitive is met. */
+static inline __attribute__((always_inline)) enum kernel_verdict judge(pl_tracer *tracer, const walk *k, pl_ref ref, bool any)
+{
+    const pl_front_primitive *p = &k->f->front->primitives[ref & PL_REF_INDEX];
+    if (k->query->shadow && p->item & PL_NO_SHADOW) return MISS;
+    tracer->counters.filtered++;
+    return filter(p, ref >> PL_REF_SHIFT, k->f, k->t_max, any);
+}
+
+/* A primitive that may be met, or must be. */
+static inline enum progress settle_primitive(pl_tracer *tracer, walk *k, pl_ref ref, bool certain)
+{
+    pl_query *query = k->query;
+    if (certain) query->found = query->done = true;
+    else if (!evaluate(tracer, k->lane, k->frame, ref, query)) return FAILED;
+    if (query->done) return ENDED;
+    k->t_max = local_t_max(k->f, query->t_max);
+    return count_step(k) ? UNDER_WAY : FAILED;
+}
+
 /* Does what stands next on the stack where it isn't a node. */
 static inline __attribute__((always_inline)) enum progress take(pl_tracer *tracer, walk *k, pl_ref ref, bool any)
 {
-    pl_query *query = k->query;
     const uint32_t kind = ref >> PL_REF_SHIFT;
-    if (kind == PL_KIND_RETURN) {
-        if (k->frame == k->base) return ENDED;
-        look(k, k->frame - 1, local_t_max(k->f - 1, query->t_max));
-        return UNDER_WAY;
-    }
-    if (kind == PL_KIND_INSTANCE) {
-        float t_max = k->t_max;
-        const int entered = descend(tracer, k->lane, k->frame, ref & PL_REF_INDEX, query, &t_max);
-        if (entered < 0) return FAILED;
-        if (entered == 0) t_max = k->t_max;
-        look(k, k->frame + (entered > 0), t_max);
-        if (entered == 0) return UNDER_WAY;
-        if (!begin(k, entered == 1)) return FAILED;
-    } else {
-        const pl_front_primitive *p = &k->f->front->primitives[ref & PL_REF_INDEX];
-        if (query->shadow && p->item & PL_NO_SHADOW) return UNDER_WAY;
-        tracer->counters.filtered++;
-        const enum kernel_verdict verdict = filter(p, kind, k->f, k->t_max, any);
-        if (verdict == MISS) return UNDER_WAY;
-        if (any && verdict == CERTAIN) {
-            query->found = query->done = true;
-            return ENDED;
-        }
-        if (!evaluate(tracer, k->lane, k->frame, ref, query)) return FAILED;
-        if (query->done) return ENDED;
-        k->t_max = local_t_max(k->f, query->t_max);
-    }
-    if (++k->steps <= PL_LIMIT_RAY_STEPS) return UNDER_WAY;
-    pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
-    return FAILED;
+    if (kind == PL_KIND_RETURN) return go_back(k);
+    if (kind == PL_KIND_INSTANCE) return go_into(tracer, k, ref & PL_REF_INDEX);
+    const enum kernel_verdict verdict = judge(tracer, k, ref, any);
+    return verdict == MISS ? UNDER_WAY : settle_primitive(tracer, k, ref, any && verdict == CERTAIN);
 }
 
 /* One ray to its end. false: an error. */

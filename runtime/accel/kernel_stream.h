@@ -1,32 +1,37 @@
 /* kernel_stream.h - rays that go different ways, a step of each in turn (part of the kernels; kernel.h has the steps).
  *
  * Nobody can foretell what a ray meets next, and a processor that guesses wrong begins again. So each round takes the
- * next entry of every ray and does all nodes one after another without a guess, then the rest; and no ray waits for
- * its own last step. Each ray's steps are those that it takes alone, so streams can't show in hits. */
+ * next entry of every ray and does all nodes one after another without a guess, then what is left, kind by kind; and no
+ * ray waits for its own last step. Each ray's steps are those that it takes alone, so streams can't show in hits. */
 
-/* The rays under way, going[0 … left), and which of them come to a node in this round, or to something else. */
+/* Rays under way, and what each comes to in this round: sets of rays, a bit each. */
 typedef struct crowd {
-    walk walks[PL_LANES], *going[PL_LANES], *at_node[PL_LANES];
-    unsigned at_other[PL_LANES]; /* places in `going` */
-    unsigned left, nodes, others;
+    walk walks[PL_LANES];
+    unsigned left, nodes, instances, primitives, returns;
     uint64_t steps; /* of all */
 } crowd;
+
+/* For each ray i of a set. */
+#define EACH(i, set) \
+    for (unsigned rest_ = set, i = 0; rest_ && (i = (unsigned)__builtin_ctz(rest_), true); rest_ &= rest_ - 1)
+
+/* Where the set of a reference's kind lies in the 64 bits of four sets: nodes, instances, returns, primitives. */
+_Static_assert(PL_LANES <= 16, "a set has 16 bits");
+static const uint8_t SET_OF_KIND[16] = {0, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 16, 32, 48};
 
 /* Takes the next entry of each ray, which stays above the top of its stack. */
 static inline void sort_out(crowd *c)
 {
-    unsigned nodes = 0, others = 0;
-    for (unsigned i = 0; i < c->left; i++) {
-        walk *k = c->going[i];
+    uint64_t sets = 0;
+    EACH(i, c->left) {
+        walk *k = &c->walks[i];
         const uint64_t at = k->stack[--k->top];
-        const bool near = !entry_is_beyond(at, k->t_max), node = (pl_ref)at >> PL_REF_SHIFT == PL_KIND_NODE;
-        c->at_node[nodes] = k;
-        c->at_other[others] = i;
-        nodes += near & node;
-        others += near & !node;
+        sets |= (uint64_t)!entry_is_beyond(at, k->t_max) << (SET_OF_KIND[(pl_ref)at >> PL_REF_SHIFT] + i);
     }
-    c->nodes = nodes;
-    c->others = others;
+    c->nodes = (uint16_t)sets;
+    c->instances = (uint16_t)(sets >> 16);
+    c->returns = (uint16_t)(sets >> 32);
+    c->primitives = (uint16_t)(sets >> 48);
 }
 
 static inline pl_ref next_of(const walk *k)
@@ -34,28 +39,50 @@ static inline pl_ref next_of(const walk *k)
     return (pl_ref)k->stack[k->top];
 }
 
+/* What came of a ray's step. false: an error. */
+static inline bool note(crowd *c, unsigned i, enum progress progress)
+{
+    if (progress == UNDER_WAY) return true;
+    c->steps += c->walks[i].steps;
+    c->left &= ~(1u << i);
+    return progress != FAILED;
+}
+
+/* The primitives of a round: first it is seen which may be met. false: an error. */
+static inline bool try_primitives(pl_tracer *tracer, crowd *c, bool any)
+{
+    unsigned candidates = 0, certain = 0;
+    EACH(i, c->primitives) {
+        const enum kernel_verdict verdict = judge(tracer, &c->walks[i], next_of(&c->walks[i]), any);
+        candidates |= (unsigned)(verdict != MISS) << i;
+        certain |= (unsigned)(verdict == CERTAIN) << i;
+    }
+    EACH(i, candidates) {
+        walk *k = &c->walks[i];
+        if (!note(c, i, settle_primitive(tracer, k, next_of(k), any && certain >> i & 1))) return false;
+    }
+    return true;
+}
+
 /* One step of each ray. false: an error. */
 static inline bool make_round(pl_tracer *tracer, crowd *c, bool any)
 {
     sort_out(c);
-    for (unsigned i = 0; i < c->nodes; i++) {
-        walk *k = c->at_node[i];
+    EACH(i, c->nodes) {
+        walk *k = &c->walks[i];
         const pl_front_node *node = &k->nodes[next_of(k)];
         wide enter, leave;
         meet(k->f, k->t_max, node, &enter, &leave);
         k->top += wide_list(enter, leave, node->child, k->stack + k->top);
         if (!make_room(k)) return false;
     }
-    c->steps += c->nodes;
-    while (c->others > 0) { /* backwards: the last ray takes the place of one that has ended */
-        const unsigned i = c->at_other[--c->others];
-        walk *k = c->going[i];
-        const enum progress progress = take(tracer, k, next_of(k), any);
-        if (progress == FAILED) return false;
-        if (progress == UNDER_WAY) continue;
-        c->steps += k->steps;
-        c->going[i] = c->going[--c->left];
+    c->steps += (unsigned)__builtin_popcount(c->nodes);
+    EACH(i, c->instances) {
+        walk *k = &c->walks[i];
+        if (!note(c, i, go_into(tracer, k, next_of(k) & PL_REF_INDEX))) return false;
     }
+    if (c->primitives && !try_primitives(tracer, c, any)) return false;
+    EACH(i, c->returns) note(c, i, go_back(&c->walks[i]));
     return true;
 }
 
@@ -70,12 +97,11 @@ bool STREAM_KERNEL(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, uns
         pl_bvh_lane *lane = &w->lanes[i];
         ok = pl_bvh_grow_frames(lane, 0, queries->error) && pl_bvh_grow_stack(lane, 0, queries->error);
         if (!ok || !begin_root(tracer, lane, &rays[i], &queries[i], &met)) continue;
-        walk *k = c.going[c.left] = &c.walks[c.left];
-        ok = set_off(k, lane, &queries[i], 0, met);
-        c.left++;
+        ok = set_off(&c.walks[i], lane, &queries[i], 0, met);
+        c.left |= 1u << i;
     }
     const bool any = queries->kind == PL_QUERY_ANY;
-    while (ok && c.left > 0) ok = any ? make_round(tracer, &c, true) : make_round(tracer, &c, false);
+    while (ok && c.left) ok = any ? make_round(tracer, &c, true) : make_round(tracer, &c, false);
     tracer->counters.box_tests += c.steps * PL_FRONT_WIDTH;
     wide_end();
     return ok;

@@ -39,16 +39,44 @@ static inline __m256i wide_keys(wide enter)
     return _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(enter)), lanes);
 }
 
+#ifdef __AVX512VL__
+/* Four integers, the largest first, in three steps. */
+static inline __m128i four_sort(__m128i v)
+{
+    __m128i others = _mm_shuffle_epi32(v, 0x4E);
+    v = _mm_mask_min_epi32(_mm_max_epi32(v, others), 0xC, v, others);
+    others = _mm_shuffle_epi32(v, 0xB1);
+    v = _mm_mask_min_epi32(_mm_max_epi32(v, others), 0xA, v, others);
+    others = _mm_shuffle_epi32(v, 0xD8);
+    return _mm_mask_min_epi32(_mm_max_epi32(v, others), 0x4, v, others);
+}
+#endif
+
 /* Entries of the children whose enter <= leave, the nearest last; their number. Writes all eight places. No branches. */
 static inline __attribute__((always_inline)) unsigned wide_list(wide enter, wide leave, const pl_ref *child, uint64_t *entries)
 {
+    const __m256i refs = _mm256_loadu_si256((const __m256i *)child);
+#ifdef __AVX512VL__
+    const __mmask8 hits = _mm256_cmp_ps_mask(enter, leave, _CMP_LE_OQ);
+    const unsigned count = (unsigned)__builtin_popcount(hits);
+    const __m256i keys = _mm256_maskz_compress_epi32(hits, wide_keys(enter));
+    if (__builtin_expect(count <= 4, 1)) { /* as nearly always: half the work */
+        const __m256i sorted = _mm256_castsi128_si256(four_sort(_mm256_castsi256_si128(keys)));
+        const __m256i mixed = _mm256_permutex2var_epi32(_mm256_permutexvar_epi32(sorted, refs), _mm256_setr_epi32(0, 8, 1, 9, 2, 10, 3, 11), sorted);
+        _mm256_storeu_si256((__m256i *)entries, mixed);
+        return count;
+    }
+    const __m256i sorted = wide_sort(keys);
+#else
     const __m256i hit = _mm256_castps_si256(_mm256_cmp_ps(enter, leave, _CMP_LE_OQ));
+    const unsigned count = (unsigned)__builtin_popcount((unsigned)_mm256_movemask_ps(_mm256_castsi256_ps(hit)));
     const __m256i sorted = wide_sort(_mm256_or_si256(wide_keys(enter), _mm256_xor_si256(hit, _mm256_set1_epi32(-1))));
-    const __m256i refs = _mm256_permutevar8x32_epi32(_mm256_loadu_si256((const __m256i *)child), sorted);
-    const __m256i low = _mm256_unpacklo_epi32(refs, sorted), high = _mm256_unpackhi_epi32(refs, sorted);
+#endif
+    const __m256i lined = _mm256_permutevar8x32_epi32(refs, sorted);
+    const __m256i low = _mm256_unpacklo_epi32(lined, sorted), high = _mm256_unpackhi_epi32(lined, sorted);
     _mm256_storeu_si256((__m256i *)entries, _mm256_permute2x128_si256(low, high, 0x20));
     _mm256_storeu_si256((__m256i *)(entries + 4), _mm256_permute2x128_si256(low, high, 0x31));
-    return (unsigned)__builtin_popcount((unsigned)_mm256_movemask_ps(_mm256_castsi256_ps(hit)));
+    return count;
 }
 
 /* The same, but one alone isn't written. *nearest is found by itself, so that the next node needn't wait for the sorting. */
