@@ -11,6 +11,12 @@
 /* POV-Ray's Antialias_Gamma: colours are compared as the eye sees them. */
 #define COMPARISON_GAMMA 2.5
 
+/* Pixels whose rays are traced together: some of a tile, BLOCK a side at most. */
+enum { BLOCK = 4 };
+typedef struct block {
+    int x, y, columns, rows;
+} block;
+
 /* One sample of the adaptive method, kept as long as its tile or pixel is being worked on. */
 typedef struct pl_sample {
     double color[3], encoded[3];
@@ -114,8 +120,8 @@ static bool grid_pixel(const pl_sampler *sampler, int x, int y, double color[3],
     const int count = sampler->options->samples * sampler->options->samples + 1;
     memset(color, 0, 3 * sizeof *color);
     for (int from = 0, some; from < count; from += some) {
-        double directions[PL_TRACE_MANY][3], colors[PL_TRACE_MANY][3];
-        some = first && from == 0 ? 1 : count - from < PL_TRACE_MANY ? count - from : PL_TRACE_MANY;
+        double directions[PL_SHADE_MANY][3], colors[PL_SHADE_MANY][3];
+        some = first && from == 0 ? 1 : count - from < PL_SHADE_MANY ? count - from : PL_SHADE_MANY;
         for (int i = 0; i < some; i++) grid_direction(sampler, x, y, from + i, directions[i]);
         if (!pl_shade(sampler->shader, directions, (unsigned)some, colors, from == 0 ? first : NULL, error)) return false;
         for (int i = 0; i < some; i++)
@@ -229,39 +235,78 @@ static bool square(pl_sampler *sampler, pl_pixel pixel, int column, int row, int
     return true;
 }
 
-static bool adaptive_block(pl_sampler *sampler, int x, int y, int columns, int rows, double (*colors)[3], pl_error *error)
+static bool adaptive_block(pl_sampler *sampler, block at, double (*colors)[3], pl_error *error)
 {
     pl_batch batch = {.count = 0};
-    for (int row = 0; row <= rows; row++)
-        for (int column = 0; column <= columns; column++)
-            if (!want(sampler, &batch, (pl_pixel){x, y}, column * sampler->steps, row * sampler->steps, error)) return false;
+    for (int row = 0; row <= at.rows; row++)
+        for (int column = 0; column <= at.columns; column++)
+            if (!want(sampler, &batch, (pl_pixel){at.x, at.y}, column * sampler->steps, row * sampler->steps, error)) return false;
     if (!take(sampler, &batch, error)) return false;
-    for (int i = 0; i < columns * rows; i++) {
+    for (int i = 0; i < at.columns * at.rows; i++) {
+        const pl_pixel pixel = {at.x + i % at.columns, at.y + i / at.columns};
         sampler->pixel_stamp++;
-        if (!square(sampler, (pl_pixel){x + i % columns, y + i / columns}, 0, 0, sampler->steps, colors[i], error)) return false;
+        if (!square(sampler, pixel, 0, 0, sampler->steps, colors[i], error)) return false;
     }
     return true;
 }
 
 /* --- pixels --- */
 
-bool pl_sampler_block(pl_sampler *sampler, int x, int y, int columns, int rows, double (*colors)[3], pl_error *error)
+/* The i-th block of a tile's first columns and rows; false: there is none. */
+static bool next_block(const pl_sampler *sampler, int columns, int rows, int i, block *at)
 {
-    double directions[PL_BLOCK * PL_BLOCK][3];
-    const int count = columns * rows;
+    const int across = (columns + BLOCK - 1) / BLOCK, x = i % across * BLOCK, y = i / across * BLOCK;
+    at->x = sampler->left + x;
+    at->y = sampler->top + y;
+    at->columns = columns - x < BLOCK ? columns - x : BLOCK;
+    at->rows = rows - y < BLOCK ? rows - y : BLOCK;
+    return y < rows;
+}
+
+/* A block's colours to where they belong in the tile. */
+static void put_in_rows(const pl_sampler *sampler, block at, int columns, const double (*block)[3], double (*rows)[3])
+{
+    rows += (at.y - sampler->top) * columns + at.x - sampler->left;
+    for (int i = 0; i < at.rows; i++) memcpy(rows + i * columns, block + i * at.columns, (size_t)at.columns * sizeof *rows);
+}
+
+/* One sample a pixel, all shaded together. */
+static bool plain_tile(pl_sampler *sampler, int columns, int rows, double (*colors)[3], pl_error *error)
+{
+    const pl_camera *camera = &pl_shader_view(sampler->shader)->camera;
+    const pl_render_options *options = sampler->options;
+    double directions[PL_TILE * PL_TILE][3], shaded[PL_TILE * PL_TILE][3];
+    unsigned count = 0;
+    block at;
+    for (int i = 0; next_block(sampler, columns, rows, i, &at); i++) {
+        pl_camera_directions(camera, at.x, at.y, at.columns, at.rows, options->width, options->height, directions + count);
+        count += (unsigned)(at.columns * at.rows);
+    }
+    if (!pl_shade(sampler->shader, directions, count, shaded, NULL, error)) return false;
+    const double (*from)[3] = shaded;
+    for (int i = 0; next_block(sampler, columns, rows, i, &at); i++, from += at.columns * at.rows)
+        put_in_rows(sampler, at, columns, from, colors);
+    return true;
+}
+bool pl_sampler_tile(pl_sampler *sampler, int columns, int rows, double (*colors)[3], pl_error *error)
+{
     if (sampler->empty) {
-        pl_shade_nothing(sampler->shader, (unsigned)count, colors);
+        pl_shade_nothing(sampler->shader, (unsigned)(columns * rows), colors);
         return true;
     }
-    if (sampler->options->antialias == PL_AA_ADAPTIVE) return adaptive_block(sampler, x, y, columns, rows, colors, error);
-    if (sampler->options->antialias == PL_AA_GRID) {
-        for (int i = 0; i < count; i++)
-            if (!grid_pixel(sampler, x + i % columns, y + i / columns, colors[i], NULL, error)) return false;
-        return true;
+    if (sampler->options->antialias == PL_AA_OFF) return plain_tile(sampler, columns, rows, colors, error);
+    block at;
+    for (int i = 0; next_block(sampler, columns, rows, i, &at); i++) {
+        double shaded[BLOCK * BLOCK][3];
+        if (sampler->options->antialias == PL_AA_ADAPTIVE) {
+            if (!adaptive_block(sampler, at, shaded, error)) return false;
+        } else {
+            for (int k = 0; k < at.columns * at.rows; k++)
+                if (!grid_pixel(sampler, at.x + k % at.columns, at.y + k / at.columns, shaded[k], NULL, error)) return false;
+        }
+        put_in_rows(sampler, at, columns, shaded, colors);
     }
-    pl_camera_directions(&pl_shader_view(sampler->shader)->camera, x, y, columns, rows, sampler->options->width,
-                         sampler->options->height, directions);
-    return pl_shade(sampler->shader, directions, (unsigned)count, colors, NULL, error);
+    return true;
 }
 
 bool pl_sampler_pixel(pl_sampler *sampler, int x, int y, double color[3], pl_first *first, pl_error *error)
@@ -270,6 +315,6 @@ bool pl_sampler_pixel(pl_sampler *sampler, int x, int y, double color[3], pl_fir
     if (sampler->options->antialias == PL_AA_GRID) return grid_pixel(sampler, x, y, color, first, error);
     direction_at(sampler, x + 0.5, y + 0.5, direction);
     if (sampler->options->antialias == PL_AA_OFF) return pl_shade(sampler->shader, &direction, 1, (double (*)[3])color, first, error);
-    return adaptive_block(sampler, x, y, 1, 1, (double (*)[3])color, error) &&
+    return adaptive_block(sampler, (block){x, y, 1, 1}, (double (*)[3])color, error) &&
            pl_shade_first(sampler->shader, direction, first, error);
 }

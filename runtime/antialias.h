@@ -2,7 +2,7 @@
  *
  *     pl_sampler *sampler = pl_sampler_create(shader, options, error);      one a thread
  *     pl_sampler_begin_tile(sampler, left, top);                            pixels are asked for tile by tile
- *     if (!pl_sampler_block(sampler, x, y, columns, rows, colors, error)) …
+ *     if (!pl_sampler_tile(sampler, columns, rows, colors, error)) …
  *
  * A pixel's colour depends on the options and the scene only, not on tiles or their order. */
 #ifndef PL_ANTIALIAS_H
@@ -12,7 +12,6 @@
 
 enum {
     PL_TILE = 16, /* pixels a side */
-    PL_BLOCK = 4, /* the same of what is sampled together */
     PL_LIMIT_GRID = 256,
     PL_LIMIT_ADAPTIVE = 9
 };
@@ -28,8 +27,8 @@ void pl_sampler_destroy(pl_sampler *sampler);
 /* Pixels left … left + PL_TILE - 1 and top … top + PL_TILE - 1 come next; they share samples. */
 void pl_sampler_begin_tile(pl_sampler *sampler, int left, int top);
 
-/* The colours of up to PL_BLOCK x PL_BLOCK pixels of the tile, row by row from (x, y) on. */
-bool pl_sampler_block(pl_sampler *sampler, int x, int y, int columns, int rows, double (*colors)[3], pl_error *error);
+/* The colours of the tile's first columns and rows, row by row. */
+bool pl_sampler_tile(pl_sampler *sampler, int columns, int rows, double (*colors)[3], pl_error *error);
 
 /* The colour of one pixel of the tile, and what the ray through its centre met. */
 bool pl_sampler_pixel(pl_sampler *sampler, int x, int y, double color[3], pl_first *first, pl_error *error);

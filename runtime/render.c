@@ -111,31 +111,32 @@ static bool is_idle(pl_job *job, uint32_t tile)
            atomic_load_explicit(&job->failed, memory_order_relaxed) < tile;
 }
 
-static bool render_block(pl_worker *worker, uint32_t tile, int left, int top, pl_error *error)
+/* Pixel by pixel, with what is asked for beside colours. */
+static bool render_pixels(pl_worker *worker, uint32_t tile, int left, int top, int columns, int rows, pl_error *error)
 {
     pl_job *job = worker->job;
-    const int width = job->options->width, height = job->options->height;
-    const int columns = width - left < PL_BLOCK ? width - left : PL_BLOCK;
-    const int rows = height - top < PL_BLOCK ? height - top : PL_BLOCK;
-    double colors[PL_BLOCK * PL_BLOCK][3];
-    if (is_idle(job, tile)) return true;
-    if (!job->wants_first && !pl_sampler_block(worker->sampler, left, top, columns, rows, colors, error)) return false;
-    const double *color = colors[0];
     for (int y = top; y < top + rows; y++)
-        for (int x = left; x < left + columns; x++, color += 3) {
-            const size_t pixel = (size_t)y * (size_t)width + (size_t)x;
-            double alone[3];
+        for (int x = left; x < left + columns; x++) {
+            const size_t pixel = (size_t)y * (size_t)job->options->width + (size_t)x;
+            double color[3];
             pl_first first;
-            if (!job->wants_first) {
-                write_color(worker, pixel, color);
-                continue;
-            }
             if (is_idle(job, tile)) return true;
-            if (!pl_sampler_pixel(worker->sampler, x, y, alone, &first, error)) return false;
-            write_color(worker, pixel, alone);
+            if (!pl_sampler_pixel(worker->sampler, x, y, color, &first, error)) return false;
+            write_color(worker, pixel, color);
             write_first(job->channels, pixel, &first);
         }
-    if (worker->first_pixel == 0.0) worker->first_pixel = seconds(CLOCK_MONOTONIC);
+    return true;
+}
+
+static bool render_colors(pl_worker *worker, int left, int top, int columns, int rows, pl_error *error)
+{
+    double colors[PL_TILE * PL_TILE][3];
+    if (!pl_sampler_tile(worker->sampler, columns, rows, colors, error)) return false;
+    for (int y = 0; y < rows; y++)
+        for (int x = 0; x < columns; x++) {
+            const size_t pixel = (size_t)(top + y) * (size_t)worker->job->options->width + (size_t)(left + x);
+            write_color(worker, pixel, colors[y * columns + x]);
+        }
     return true;
 }
 
@@ -143,10 +144,13 @@ static bool render_tile(pl_worker *worker, uint32_t tile, pl_error *error)
 {
     const pl_job *job = worker->job;
     const int left = (int)(tile % job->columns) * PL_TILE, top = (int)(tile / job->columns) * PL_TILE;
+    const int columns = job->options->width - left < PL_TILE ? job->options->width - left : PL_TILE;
+    const int rows = job->options->height - top < PL_TILE ? job->options->height - top : PL_TILE;
     pl_sampler_begin_tile(worker->sampler, left, top);
-    for (int y = top; y < job->options->height && y < top + PL_TILE; y += PL_BLOCK)
-        for (int x = left; x < job->options->width && x < left + PL_TILE; x += PL_BLOCK)
-            if (!render_block(worker, tile, x, y, error)) return false;
+    if (!(job->wants_first ? render_pixels(worker, tile, left, top, columns, rows, error)
+                           : render_colors(worker, left, top, columns, rows, error)))
+        return false;
+    if (worker->first_pixel == 0.0) worker->first_pixel = seconds(CLOCK_MONOTONIC);
     return true;
 }
 

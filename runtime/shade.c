@@ -31,6 +31,7 @@ typedef struct pl_bounce {
 typedef struct pl_spotted {
     const pl_bounce *ray;
     bool found; /* false: the ray met nothing, and the rest is unspecified */
+    double depth;               /* t on the ray */
     double point[3], normal[3]; /* turned against the ray */
     double flat[3];             /* the surface's own normal, to either side */
     double width;               /* of the pixel's footprint here */
@@ -60,9 +61,10 @@ struct pl_shader {
     pl_ray eye_rays[PL_TRACE_MANY]; /* as eyes: all but their directions is the same for all samples */
     pl_hit hits[PL_TRACE_MANY];
     bool blocked[PL_TRACE_MANY];
-    pl_shine shines[PL_TRACE_MANY];
-    pl_bounce eyes[PL_TRACE_MANY];
-    pl_spotted spotted[PL_TRACE_MANY];
+    /* Samples that are shaded together, and those of their hits that a light shines on. */
+    pl_bounce eyes[PL_SHADE_MANY];
+    pl_spotted spotted[PL_SHADE_MANY];
+    pl_shine shines[PL_SHADE_MANY], *sorted[PL_SHADE_MANY];
 };
 
 bool pl_view_create(pl_view *view, const pl_scene *scene, pl_error *error)
@@ -122,10 +124,13 @@ static void set_eye(const pl_view *view, pl_bounce *eye)
     memcpy(eye->origin, view->camera.location, sizeof eye->origin);
 }
 
-static void look(pl_shader *shader, unsigned i, const double direction[3])
+/* The eye's rays in some of the samples' directions. */
+static void look(pl_shader *shader, unsigned first, unsigned count, const double (*directions)[3])
 {
-    memcpy(shader->eyes[i].direction, direction, sizeof shader->eyes[i].direction);
-    memcpy(shader->eye_rays[i].direction, direction, sizeof shader->eye_rays[i].direction);
+    for (unsigned i = 0; i < count; i++) {
+        memcpy(shader->eyes[first + i].direction, directions[i], sizeof directions[i]);
+        memcpy(shader->eye_rays[i].direction, directions[i], sizeof directions[i]);
+    }
 }
 
 pl_shader *pl_shader_create(const pl_view *view, pl_error *error)
@@ -137,10 +142,8 @@ pl_shader *pl_shader_create(const pl_view *view, pl_error *error)
     }
     shader->view = view;
     for (int i = 0; i < PL_TRACE_MANY; i++) pl_hit_init(&shader->hits[i]);
-    for (int i = 0; i < PL_TRACE_MANY; i++) {
-        set_eye(view, &shader->eyes[i]);
-        set_ray(view, &shader->eyes[i], &shader->eye_rays[i]);
-    }
+    for (int i = 0; i < PL_SHADE_MANY; i++) set_eye(view, &shader->eyes[i]);
+    for (int i = 0; i < PL_TRACE_MANY; i++) set_ray(view, &shader->eyes[i], &shader->eye_rays[i]);
     shader->tracer = pl_tracer_create(view->scene, error);
     if (shader->tracer) return shader;
     pl_shader_destroy(shader);
@@ -259,6 +262,43 @@ static bool shadow_light(pl_shader *shader, pl_shine *const *shines, unsigned co
     return true;
 }
 
+/* Puts shines about into the order of their distance from the eye: into drawers. Hits of a tile that are equally far away
+ * lie side by side, so their rays to a light meet the same things; those of neighbouring pixels may be far apart. */
+static void sort_by_depth(pl_shine *shines, unsigned count, pl_shine **sorted)
+{
+    enum { DRAWERS = 64 };
+    uint8_t drawers[PL_SHADE_MANY];
+    unsigned begin[DRAWERS + 1] = {0};
+    double nearest = INFINITY, farthest = 0.0;
+    for (unsigned i = 0; i < count; i++) {
+        nearest = fmin(shines[i].at->depth, nearest);
+        farthest = fmax(shines[i].at->depth, farthest);
+    }
+    const double scale = farthest > nearest ? (DRAWERS - 1) / (farthest - nearest) : 0.0;
+    for (unsigned i = 0; i < count; i++) {
+        const double place = (shines[i].at->depth - nearest) * scale;
+        drawers[i] = place < DRAWERS - 1 ? (uint8_t)place : DRAWERS - 1;
+        begin[drawers[i] + 1]++;
+    }
+    for (int i = 0; i < DRAWERS; i++) begin[i + 1] += begin[i];
+    for (unsigned i = 0; i < count; i++) sorted[begin[drawers[i]]++] = &shines[i];
+}
+
+/* What of the first `count` shines arrives. */
+static bool cast_shadows(pl_shader *shader, unsigned count, pl_error *error)
+{
+    pl_shine **next = shader->sorted, *const *end = next + count;
+    sort_by_depth(shader->shines, count, next);
+    while (next < end) {
+        pl_shine *shadowed[PL_TRACE_MANY];
+        unsigned rays = 0;
+        for (; next < end && rays < PL_TRACE_MANY; next++)
+            if (set_shadow_ray(shader, *next, &shader->traced[rays])) shadowed[rays++] = *next;
+        if (rays && !shadow_light(shader, shadowed, rays, error)) return false;
+    }
+    return true;
+}
+
 /* --- light on a surface (section 2) --- */
 
 /* Of the angle between the light and the mirrored ray; 0: no highlight. */
@@ -324,16 +364,13 @@ static void add_shine(const pl_light *light, const pl_shine *shine)
 /* Adds what one light does on some hits. Shadows are traced last, and only where they can matter. */
 static bool add_light(pl_shader *shader, const pl_light *light, pl_spotted *spotted, unsigned count, pl_error *error)
 {
-    pl_shine *shadowed[PL_TRACE_MANY];
-    unsigned shining = 0, rays = 0;
+    unsigned shining = 0;
     for (unsigned i = 0; i < count; i++) {
         pl_shine *shine = &shader->shines[shining];
         shine->at = &spotted[i];
-        if (!spotted[i].found || !shines_on(light, shine)) continue;
-        shining++;
-        if (!light->shadowless && set_shadow_ray(shader, shine, &shader->traced[rays])) shadowed[rays++] = shine;
+        if (spotted[i].found && shines_on(light, shine)) shining++;
     }
-    if (rays && !shadow_light(shader, shadowed, rays, error)) return false;
+    if (!light->shadowless && !cast_shadows(shader, shining, error)) return false;
     for (unsigned i = 0; i < shining; i++) add_shine(light, &shader->shines[i]);
     return true;
 }
@@ -413,6 +450,7 @@ static bool spot(const pl_bounce *bounce, const pl_ray *ray, double t, const pl_
                  pl_error *error)
 {
     at->ray = bounce;
+    at->depth = t;
     at->epsilon = pl_hit_epsilon(surface, ray, t);
     at->width = ray->width + ray->spread * t;
     pl_texture_finish(surface->texture, &at->finish);
@@ -463,11 +501,10 @@ static bool light_hits(pl_shader *shader, pl_spotted *spotted, unsigned count, p
     return true;
 }
 
-/* Finds what some bounces' rays meet, and lights it. */
-static bool spot_all(pl_shader *shader, const pl_bounce *bounces, const pl_ray *rays, unsigned count, pl_spotted *spotted,
-                     pl_first *first, pl_error *error)
+/* Finds what the rays of some bounces meet; *found: how many do. */
+static bool spot_many(pl_shader *shader, const pl_bounce *bounces, const pl_ray *rays, unsigned count, pl_spotted *spotted,
+                      unsigned *found, pl_first *first, pl_error *error)
 {
-    unsigned found = 0;
     if (pl_trace_nearest_many(shader->tracer, rays, count, shader->hits, error) < count) return false;
     for (unsigned i = 0; i < count; i++) {
         const pl_ray *ray = &rays[i];
@@ -477,10 +514,23 @@ static bool spot_all(pl_shader *shader, const pl_bounce *bounces, const pl_ray *
         if (spotted[i].found && !(pl_trace_surface(shader->tracer, ray, hit, &surface, error) &&
                                   spot(&bounces[i], ray, hit->t, &surface, &spotted[i], error)))
             return false;
-        found += spotted[i].found;
+        *found += spotted[i].found;
         if (first && !set_first(shader, hit, &surface, first, error)) return false;
     }
-    return found == 0 || light_hits(shader, spotted, count, error);
+    return true;
+}
+
+/* The same of the eye's rays, a packet at a time, and lights it. */
+static bool spot_all(pl_shader *shader, const double (*directions)[3], unsigned count, pl_first *first, pl_error *error)
+{
+    unsigned found = 0;
+    for (unsigned from = 0; from < count; from += PL_TRACE_MANY) {
+        const unsigned some = count - from < PL_TRACE_MANY ? count - from : PL_TRACE_MANY;
+        look(shader, from, some, directions + from);
+        if (!spot_many(shader, shader->eyes + from, shader->eye_rays, some, shader->spotted + from, &found, first, error))
+            return false;
+    }
+    return found == 0 || light_hits(shader, shader->spotted, count, error);
 }
 
 /* Adds a lighted hit to the sample's colour; rays that go on are left waiting. */
@@ -498,8 +548,11 @@ static bool follow_all(pl_shader *shader, double color[3], pl_error *error)
         const pl_bounce bounce = shader->waiting[--shader->count];
         pl_ray ray;
         pl_spotted at;
+        unsigned found = 0;
         set_ray(shader->view, &bounce, &ray);
-        if (!spot_all(shader, &bounce, &ray, 1, &at, NULL, error) || !collect(shader, &bounce, &at, color, error)) return false;
+        if (!spot_many(shader, &bounce, &ray, 1, &at, &found, NULL, error)) return false;
+        if (found && !light_hits(shader, &at, 1, error)) return false;
+        if (!collect(shader, &bounce, &at, color, error)) return false;
     }
     return true;
 }
@@ -509,7 +562,7 @@ bool pl_shade_first(pl_shader *shader, const double direction[3], pl_first *firs
     pl_surface surface;
     begin_first(shader, first);
     shader->rays.primary++;
-    look(shader, 0, direction);
+    look(shader, 0, 1, (const double (*)[3])direction);
     if (!pl_trace_nearest(shader->tracer, shader->eye_rays, shader->hits, error)) return false;
     if (shader->hits->t != INFINITY &&
         !pl_trace_surface(shader->tracer, shader->eye_rays, shader->hits, &surface, error))
@@ -544,8 +597,7 @@ bool pl_shade(pl_shader *shader, const double (*directions)[3], unsigned count, 
     if (is_blind(shader->view)) return !first || pl_shade_first(shader, *directions, first, error);
     if (first) begin_first(shader, first);
     shader->rays.primary += count;
-    for (unsigned i = 0; i < count; i++) look(shader, i, directions[i]);
-    if (!spot_all(shader, shader->eyes, shader->eye_rays, count, shader->spotted, first, error)) return false;
+    if (!spot_all(shader, directions, count, first, error)) return false;
     for (unsigned i = 0; i < count; i++) {
         shader->count = 0;
         shader->sample_rays = 0;

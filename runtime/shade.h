@@ -16,6 +16,7 @@
 #include "trace.h"
 
 enum {
+    PL_SHADE_MANY = 256, /* samples at once */
     /* Rays that may come of one sample. Reached only by scenes that turn off both max_trace_level and adc_bailout. */
     PL_LIMIT_SAMPLE_RAYS = 1 << 18
 };
@@ -50,8 +51,8 @@ typedef struct pl_first {
     uint32_t miss_depth;
 } pl_first;
 
-/* The colours seen from the camera in up to PL_TRACE_MANY unit directions, whose rays and shadows are traced together;
- * first: of a single one, or NULL. */
+/* The colours seen from the camera in up to PL_SHADE_MANY unit directions. Each PL_TRACE_MANY of them that follow each other are
+ * traced together, so neighbours should; shadows are traced together whatever the order. first: of a single one, or NULL. */
 bool pl_shade(pl_shader *shader, const double (*directions)[3], unsigned count, double (*colors)[3], pl_first *first,
               pl_error *error);
 
