@@ -331,8 +331,8 @@ class Session:
     def work(self) -> None:
         """Read and resolve for a moment what edits touched, and publish what is known. Call it until ``has_work`` is
         false."""
-        while self._arrived:
-            self._arrived.popleft()()
+        if self._arrived:
+            self._arrived.popleft()()  # one at a time: a message may come
         finished = self.workspace.project.work(Deadline(SLICE, self._is_message_waiting))
         if not finished and self._is_message_waiting():
             return  # what is known now is about to be out of date
@@ -390,6 +390,8 @@ class Session:
     def _take(self, result: Result) -> None:
         """Show what the whole-file checks found."""
         result.apply()
+        if result.answer.is_piece:
+            return
         if not result.answer.more:
             self.progress.end("checks")
         elif result.answer.share is not None:

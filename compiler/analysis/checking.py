@@ -316,8 +316,9 @@ def main() -> None:
     signal.signal(signal.SIGINT, work.interruption.interrupt)
 
     def send(answer: Answer) -> None:
-        output.write(pickle.dumps(answer))
-        output.flush()
+        for piece in telling.in_pieces(answer):
+            output.write(pickle.dumps(piece))
+            output.flush()
         work.interruption.left = None
         _tidy()
 

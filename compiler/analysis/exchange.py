@@ -63,7 +63,8 @@ class Answer(NamedTuple):
     """About the texts of the request ``key``. ``findings`` are all about ``blocks`` (file, number), ``general`` all about what
     parts share. ``insights`` are what is shown beside the text of the blocks ``forecast_of``. ``forecast`` is None until
     all is known and where the scene has errors: a dict with the numbers of graph.forecast.Forecast. ``more``: others
-    follow, unless the text changes. ``share`` of the parts is done; None while it isn't worth telling."""
+    follow, unless the text changes. ``share`` of the parts is done; None while it isn't worth telling. One that
+    ``is_piece`` holds some insights of the next one and nothing else (telling.in_pieces)."""
 
     key: int
     blocks: tuple[tuple[int, int], ...] = ()
@@ -74,3 +75,4 @@ class Answer(NamedTuple):
     forecast: dict[str, Any] | None = None
     more: bool = False
     share: float | None = None
+    is_piece: bool = False

@@ -5,12 +5,12 @@ Example: ``answer(scene, request, places, new)`` tells what was found out about 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Iterable
+from typing import TYPE_CHECKING, Any, Iterable, Iterator
 
 from ..reading.diagnostics import Diagnostic
 from ..reading.source import Span
 from .exchange import Answer, Finding, Request
-from .insights import placed
+from .insights import Placed, placed
 from .parts import Part
 from .text import Block
 
@@ -23,11 +23,28 @@ _MISSING = frozenset(("no-camera", "no-object", "no-light"))
 # What isn't sure while a block that can't be read may hold a use.
 _UNSURE = frozenset(("unused", "unreachable"))
 
+# The insights about so many blocks are read in a millisecond or two.
+PIECE = 256
+
 
 def answer(scene: SceneState, request: Request, places: dict[Block, tuple[int, int]], new: Iterable[Part]) -> Answer:
     """``new`` are parts of which more is known than was told; ``places`` are the numbers of each block's file and of the
     block in it."""
     return _Told(scene, places).answer(request.key, dict.fromkeys(new))
+
+
+def in_pieces(answer: Answer) -> Iterator[Answer]:
+    """The answer as several, none of which takes long to read: whoever does that has a key to answer. The last one has all
+    but the insights of the others."""
+    by_block: dict[tuple[int, int], list[Placed]] = {}
+    for each in answer.insights:
+        by_block.setdefault(each.place[:2], []).append(each)
+    blocks = answer.forecast_of
+    while len(blocks) > PIECE:
+        some, blocks = blocks[:PIECE], blocks[PIECE:]
+        insights = tuple(each for block in some for each in by_block.pop(block, ()))
+        yield Answer(answer.key, insights=insights, forecast_of=some, more=True, is_piece=True)
+    yield answer._replace(insights=tuple(each for several in by_block.values() for each in several), forecast_of=blocks)
 
 
 class _Told:

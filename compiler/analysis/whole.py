@@ -94,12 +94,14 @@ class Result:
     def apply(self) -> None:
         """Give the scene its messages; those of blocks that have changed since are dropped."""
         scene, answer = self.snapshot.scene, self.answer
-        scene.forecast = answer.forecast or scene.forecast
-        for file, number in answer.blocks:
-            scene.whole.pop(self.snapshot.blocks[file][number], None)
         for file, number in answer.forecast_of:
             scene.insights.pop(self.snapshot.blocks[file][number], None)
         scene.insights.update(kept(answer.insights, self._span))
+        if answer.is_piece:
+            return
+        scene.forecast = answer.forecast or scene.forecast
+        for file, number in answer.blocks:
+            scene.whole.pop(self.snapshot.blocks[file][number], None)
         scene.general.clear()
         for finding in answer.findings:
             self._keep(finding, scene.whole)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import queue
 
 import pytest
-from plsys.compiler.analysis import Checker, Project
-from plsys.compiler.analysis.whole import MAX_KNOWN
+from plsys.compiler.analysis import Checker, Project, telling
+from plsys.compiler.analysis.checking import Work
+from plsys.compiler.analysis.whole import MAX_KNOWN, Result, Snapshot
 
 
 @pytest.fixture
@@ -68,3 +69,28 @@ def test_texts_that_follow_each_other_before_one_is_checked(checker, results):
         checker.want(scene)
         checker.go()
     assert codes(checker, results, scene, document) == ["unused"] * 40
+
+
+def test_what_is_told_in_pieces_is_what_is_told_at_once(monkeypatch):
+    """Reading all insights of a large part at once would keep an editor's key waiting."""
+    monkeypatch.setattr(telling, "PIECE", 3)
+    plant = "object {{ A{i} }}\nSelection A{i} {{ [ n{i} = {i} ] A{i}; if (n{i} > 0) A{i} -> box + [ --n{i} ] A{i}; }}\n"
+    text = "".join(plant.format(i=i) for i in range(10))
+    counts = []
+
+    def checked(told):
+        document = Project().open(None, text.encode(), name="x")
+        (scene,) = document.scenes
+        scene.work()
+        snapshot, answers = Snapshot.of(scene, 0), []
+        Work().run(snapshot.request, answers.append)
+        for answer in answers:
+            several = list(told(answer))
+            counts.append(len(several))
+            for each in several:
+                Result(snapshot, each).apply()
+        insights = [scene.insights.get(block) for block in document.text.blocks]
+        return insights, scene.forecast, [each.diagnostic.message for each in scene.messages(document)]
+
+    assert checked(telling.in_pieces) == checked(lambda answer: [answer])
+    assert max(counts) > 3
