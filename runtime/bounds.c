@@ -76,7 +76,7 @@ pl_box pl_box_under(const pl_states *states, const pl_item *item, const pl_affin
                 }
                 continue;
             }
-            part = pl_box_map(&at, &state->box);
+            part = pl_box_map(&at, &state->bounds->box);
         }
         /* A composed map may overflow where the normative chain of mapped rays doesn't: no bounds are known then. */
         if (has_nan(&part)) return pl_box_everything();
@@ -87,7 +87,7 @@ pl_box pl_box_under(const pl_states *states, const pl_item *item, const pl_affin
 
 pl_reach pl_item_reach(const pl_states *states, const pl_item *item)
 {
-    if (item->kind == PL_NODE_ENTER) return states->list[item->what].gate;
+    if (item->kind == PL_NODE_ENTER) return states->list[item->what].bounds->gate;
     pl_box box = item->kind == PL_NODE_MESH ? *pl_mesh_box(states->meshes[item->what])
                                             : pl_shape_box(pl_shape_of(item->what), item->arguments, NULL);
     return pl_reach_leaf(pl_box_is_finite(&box) ? 1.7320508075688774 * pl_box_reach(&box) : 0.0);
@@ -111,7 +111,7 @@ pl_box pl_item_box(const pl_states *states, const pl_item *item, pl_reach *reach
 {
     if (!states->cuts || item->kind != PL_NODE_ENTER) return pl_item_box_tight(states, item, reach);
     pl_affine map = item_map(states, item, reach);
-    pl_box box = pl_box_map(&map, &states->list[item->what].box);
+    pl_box box = pl_box_map(&map, &states->list[item->what].bounds->box);
     return has_nan(&box) ? pl_box_everything() : box;
 }
 
@@ -123,9 +123,9 @@ static const pl_item *find_item(const pl_state *state, const pl_path *path, uint
         uint32_t middle = lo + (hi - lo) / 2;
         const pl_item *item = &state->items[middle];
         int order = 0;
-        for (uint32_t i = 0; i < item->term_count && order == 0; i++) {
+        for (uint32_t i = 0; i < item->site->term_count && order == 0; i++) {
             if (at + i >= path->length) return NULL;
-            uint32_t mine = item->terms[i], wanted = path->terms[at + i];
+            uint32_t mine = item->site->terms[i], wanted = path->terms[at + i];
             order = (mine > wanted) - (mine < wanted);
         }
         if (order == 0) return item;
@@ -144,7 +144,7 @@ uint64_t pl_states_locate(const pl_states *states, const pl_path *path, uint32_t
         const pl_item *item = find_item(state, path, at);
         if (!item) return UINT64_MAX;
         primitive = pl_add_saturating(primitive, item->first);
-        at += item->term_count;
+        at += item->site->term_count;
         if (item->kind != PL_NODE_ENTER || entered == depth) return primitive;
         state = &states->list[item->what];
     }

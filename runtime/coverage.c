@@ -100,7 +100,7 @@ static void set_box(const pl_states *states, part *p)
     pl_box box;
     memset(p->half, 0, sizeof p->half);
     if (item->kind == PL_NODE_ENTER) {
-        const pl_box *own = &states->list[item->what].box;
+        const pl_box *own = &states->list[item->what].bounds->box;
         double middle[3];
         for (int k = 0; k < 3; k++) {
             middle[k] = 0.5 * (own->lo[k] + own->hi[k]);
@@ -121,7 +121,7 @@ static void set_box(const pl_states *states, part *p)
 static bool add_part(const pl_states *states, parts *all, const part *parent, const pl_item *item)
 {
     if (pl_item_primitives(states, item) == 0 || pl_item_unbounded(states, item)) return true;
-    if (item->kind == PL_NODE_ENTER && pl_box_is_empty(&states->list[item->what].box)) return true;
+    if (item->kind == PL_NODE_ENTER && pl_box_is_empty(&states->list[item->what].bounds->box)) return true;
     if (all->count == all->capacity) {
         size_t capacity = all->capacity ? 2 * all->capacity : 256;
         part *list = realloc(all->list, capacity * sizeof *list);
@@ -144,7 +144,7 @@ static bool add_part(const pl_states *states, parts *all, const part *parent, co
 /* The parts of a state, those of no matter what size if there are too many: breadth first, so that all are opened alike. */
 static bool find_parts(const pl_states *states, uint32_t state, parts *all)
 {
-    const double smallest = PARTS * states->list[state].diameter;
+    const double smallest = PARTS * states->list[state].bounds->diameter;
     const part whole = {.to_parent = pl_affine_identity(), .to_object = pl_affine_identity(), .stretch = 1.0};
     *all = (parts){0};
     for (uint32_t i = 0; i < states->list[state].item_count; i++)
@@ -153,7 +153,7 @@ static bool find_parts(const pl_states *states, uint32_t state, parts *all)
     while (all->head < all->count) {
         const part p = all->list[all->head++];
         const pl_state *below = p.item->kind == PL_NODE_ENTER ? &states->list[p.item->what] : NULL;
-        if (!below || below->diameter * p.stretch <= smallest || all->count - all->head + kept >= MOST_PARTS) {
+        if (!below || below->bounds->diameter * p.stretch <= smallest || all->count - all->head + kept >= MOST_PARTS) {
             all->list[kept++] = p;
             continue;
         }
@@ -209,7 +209,7 @@ static bool meets_box(const pl_box *box, const double o[3], const double d[3], d
 /* The bits of its rays that meet the box. */
 static uint64_t make_bundle(const pl_states *states, uint32_t state, int index, int bundles, bundle *made)
 {
-    const pl_box *box = &states->list[state].box;
+    const pl_box *box = &states->list[state].bounds->box;
     const int direction = index / (bundles * bundles), at = index % (bundles * bundles);
     const uint64_t key = pl_mix(state, (uint64_t)index);
     uint64_t met = 0;
@@ -254,7 +254,7 @@ static bool meets_part(const pl_states *states, const part *p, const double o[3]
     pl_root roots[PL_SHAPE_ROOTS];
     double at[3];
     pl_affine_point(&p->to_object, o, at);
-    if (item->kind == PL_NODE_ENTER) return meets_box(&states->list[item->what].box, at, d, &enter, &leave);
+    if (item->kind == PL_NODE_ENTER) return meets_box(&states->list[item->what].bounds->box, at, d, &enter, &leave);
     if (item->kind == PL_NODE_MESH) return pl_mesh_nearest(states->meshes[item->what], at, d, -INFINITY, INFINITY, roots);
     return pl_shape_of(item->what)->roots(item->arguments, at, d, -INFINITY, INFINITY, roots) > 0;
 }
@@ -303,7 +303,7 @@ static bool send(const pl_states *states, const double middle[3], const parts *a
 
 static bool find_meetings(const pl_states *states, uint32_t state, meetings *found)
 {
-    const pl_box *box = &states->list[state].box;
+    const pl_box *box = &states->list[state].bounds->box;
     const double middle[3] = {0.5 * (box->lo[0] + box->hi[0]), 0.5 * (box->lo[1] + box->hi[1]),
                               0.5 * (box->lo[2] + box->hi[2])};
     parts all;
@@ -358,7 +358,7 @@ static float evaluate(shares *table, uint32_t state, const meetings *found)
 static bool is_measured(const pl_states *states, uint32_t index)
 {
     const pl_state *state = &states->list[index];
-    return index && !state->unbounded && !pl_box_is_empty(&state->box) && pl_box_is_finite(&state->box);
+    return index && !state->unbounded && !pl_box_is_empty(&state->bounds->box) && pl_box_is_finite(&state->bounds->box);
 }
 
 static bool is_known(pl_coverage *c, uint32_t state)

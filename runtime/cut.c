@@ -59,7 +59,7 @@ static pl_span span_with_room(const pl_box *box, double diameter, const double o
 pl_span pl_span_in(const pl_states *states, uint32_t state, const double o[3], const double d[3], pl_span within)
 {
     const pl_state *s = &states->list[state];
-    return span_with_room(&s->box, s->diameter, o, d, pl_reach_slack(&s->gate, o), within);
+    return span_with_room(&s->bounds->box, s->bounds->diameter, o, d, pl_reach_slack(&s->bounds->gate, o), within);
 }
 
 pl_span pl_span_below(const pl_gate_box *gate, const double o[3], const double d[3], pl_span within)
@@ -100,9 +100,9 @@ pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], c
 {
     const pl_state *s = &states->list[state];
     pl_gate_box box;
-    box.box = s->box;
-    box.reach = s->gate;
-    box.diameter = s->diameter;
+    box.box = s->bounds->box;
+    box.reach = s->bounds->gate;
+    box.diameter = s->bounds->diameter;
     box.unbounded = s->unbounded;
     box.endless = s->endless;
     box.bevelled = false;

@@ -181,7 +181,7 @@ static double box_support(const pl_box *box, const double u[3])
 static double leaf_support(const pl_states *states, const pl_item *item, const double u[3])
 {
     if (item->kind == PL_NODE_MESH) return box_support(pl_mesh_box(states->meshes[item->what]), u);
-    if (item->kind == PL_NODE_ENTER) return box_support(&states->list[item->what].box, u);
+    if (item->kind == PL_NODE_ENTER) return box_support(&states->list[item->what].bounds->box, u);
     return pl_shape_of(item->what)->support(item->arguments, u);
 }
 
@@ -252,12 +252,12 @@ static bool find_boxes(component *c)
         for (int axis = 0; axis < 3; axis++) {
             double u[3] = {0.0, 0.0, 0.0};
             u[axis] = 1.0;
-            state->box.hi[axis] = support(c, s, i, u);
+            state->bounds->box.hi[axis] = support(c, s, i, u);
             u[axis] = -1.0;
-            state->box.lo[axis] = -support(c, s, i, u);
+            state->bounds->box.lo[axis] = -support(c, s, i, u);
         }
-        double size = 1.7320508075688774 * pl_box_reach(&state->box);
-        state->gate = (pl_reach){GATE, GATE * (size + 1.0), size};
+        double size = 1.7320508075688774 * pl_box_reach(&state->bounds->box);
+        state->bounds->gate = (pl_reach){GATE, GATE * (size + 1.0), size};
     }
     free(s);
     return true;

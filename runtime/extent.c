@@ -99,7 +99,7 @@ static bool wait_for_item(search *s, const pl_item *item, const row *outer, doub
     if (item->kind == PL_NODE_ENTER) {
         entry.state = item->what;
         entry.exact = false;
-        entry.bound = support_of_box(&at, &s->states->list[item->what].box);
+        entry.bound = support_of_box(&at, &s->states->list[item->what].bounds->box);
     } else if (item->kind == PL_NODE_MESH) {
         entry.bound = support_of_mesh(s, &at, item->what);
     } else {
@@ -141,7 +141,7 @@ static void join(const pl_states *states, const pl_item *item, uint32_t state, c
         s.count = 0;
         s.opened = 0;
         if (item) wait_for_item(&s, item, &outer, INFINITY);
-        else wait_for(&s, (waiting){support_of_box(&outer, &states->list[state].box), outer, state, false});
+        else wait_for(&s, (waiting){support_of_box(&outer, &states->list[state].bounds->box), outer, state, false});
         double most = greatest(&s);
         if (sign > 0.0) box->hi[axis] = most;
         else box->lo[axis] = -most;
@@ -159,7 +159,7 @@ void pl_join_symbol_box(pl_states *states, uint32_t state)
     pl_node_box *node = &states->node_boxes[it->symbol];
     pl_affine identity = pl_affine_identity();
     join(states, NULL, state, &identity, &node->box);
-    pl_reach_join(&node->reach, &it->reach);
+    pl_reach_join(&node->reach, &it->bounds->reach);
     node->unbounded = node->unbounded || it->unbounded || lacks_bounds(&node->box);
 }
 

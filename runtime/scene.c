@@ -249,7 +249,7 @@ static bool build(pl_scene *scene, pl_error *error)
     if (scene->states.count) {
         const pl_state *root = &scene->states.list[0];
         counts->primitives = generated(&scene->states);
-        counts->singular = root->singular;
+        counts->singular = root->bounds->singular;
         counts->depth = root->endless ? UINT64_MAX : root->depth;
         counts->states = scene->states.count - 1; /* the scene itself is none */
     }

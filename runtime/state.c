@@ -154,7 +154,7 @@ uint32_t pl_states_find(const pl_states *states, uint32_t symbol, const pl_scope
     for (uint32_t slot = (uint32_t)hash & mask; states->table_size && states->table[slot]; slot = (slot + 1) & mask) {
         const pl_state *state = &states->list[states->table[slot] - 1];
         uint32_t i = 0;
-        while (state->symbol == symbol && i < words && state->key[i] == key_word(states->program, symbol, scope, i)) i++;
+        while (state->symbol == symbol && i < words && state->bounds->key[i] == key_word(states->program, symbol, scope, i)) i++;
         if (i == words) return states->table[slot] - 1;
     }
     return UINT32_MAX;
@@ -167,7 +167,7 @@ static uint32_t find_slot(const pl_states *states, const uint64_t *key)
     uint32_t mask = states->table_size - 1, slot = (uint32_t)hash_key(key, words) & mask;
     for (; states->table[slot]; slot = (slot + 1) & mask) {
         const pl_state *state = &states->list[states->table[slot] - 1];
-        if (state->symbol == (uint32_t)key[0] && memcmp(state->key, key, words * sizeof *key) == 0) break;
+        if (state->symbol == (uint32_t)key[0] && memcmp(state->bounds->key, key, words * sizeof *key) == 0) break;
     }
     return slot;
 }
@@ -181,7 +181,7 @@ static bool grow_table(pl_states *states, pl_error *error)
     states->table = table;
     states->table_size = size;
     for (uint32_t i = 0; i < states->count; i++)
-        if (states->list[i].key) table[find_slot(states, states->list[i].key)] = i + 1;
+        if (states->list[i].bounds->key) table[find_slot(states, states->list[i].bounds->key)] = i + 1;
     free(old);
     return true;
 }
@@ -207,8 +207,11 @@ static pl_state *add_state(builder *b, uint32_t symbol, const uint64_t *key)
         states->capacity = capacity;
         states->bytes += more;
     }
+    pl_state_bounds *bounds = pl_states_allocate(states, sizeof *bounds, b->error);
+    if (!bounds) return NULL;
+    *bounds = (pl_state_bounds){.box = pl_box_empty(), .key = key};
     pl_state *state = &states->list[states->count++];
-    *state = (pl_state){.symbol = symbol, .box = pl_box_empty(), .key = key, .open = true};
+    *state = (pl_state){.symbol = symbol, .bounds = bounds, .open = true};
     return state;
 }
 
@@ -237,6 +240,22 @@ static bool remember_node(builder *b)
     return true;
 }
 
+/* Where the walk stands within its application. */
+static const pl_site *keep_site(builder *b)
+{
+    const pl_walk *walk = &b->walk;
+    const size_t terms = walk->at.terms * sizeof *walk->path.terms;
+    pl_site *site = pl_states_allocate(b->states, sizeof *site + terms, b->error);
+    if (!site) return NULL;
+    *site = (pl_site){.rule = walk->at.rule,
+                      .texture = (int32_t)walk->at.marks[2] - 1,
+                      .texture_transforms = (uint16_t)walk->at.marks[3],
+                      .texture_code = walk->at.marks[4] != 0,
+                      .term_count = walk->at.terms};
+    if (terms) memcpy(site->terms, walk->path.terms, terms);
+    return site;
+}
+
 /* Adds the leaf at which the walk stands to the items. */
 static bool add_item(builder *b, uint8_t kind, uint32_t what)
 {
@@ -248,15 +267,10 @@ static bool add_item(builder *b, uint8_t kind, uint32_t what)
                     .no_shadow = walk->at.no_shadow,
                     .what = what,
                     .transform_count = walk->at.marks[0],
-                    .term_count = walk->at.terms,
-                    .rule = walk->at.rule,
-                    .texture = (int32_t)walk->at.marks[2] - 1,
-                    .texture_transforms = (uint16_t)walk->at.marks[3],
-                    .texture_code = walk->at.marks[4]};
+                    .site = keep_site(b)};
     if (kind == PL_NODE_PRIMITIVE) memcpy(item.arguments, walk->arguments, sizeof item.arguments);
     item.transforms = keep(b, b->chain.data, item.transform_count * sizeof *item.transforms);
-    item.terms = keep(b, walk->path.terms, item.term_count * sizeof *item.terms);
-    if (!item.transforms || !item.terms) return false;
+    if (!item.transforms || !item.site) return false;
     pl_item *place = pl_array_extend(&b->items, 1);
     uint32_t *trail_count = pl_array_extend(&b->trail_counts, 1);
     pl_trail_node *trail = pl_array_extend(&b->trails, walk->at.marks[1]);
@@ -331,7 +345,7 @@ static bool begin_visit(builder *b, uint32_t symbol, const uint64_t *key)
     pl_state *state = &b->states->list[v.state];
     state->items = items;
     state->item_count = (uint32_t)b->items.count;
-    state->singular = b->walk.singular;
+    state->bounds->singular = b->walk.singular;
     return true;
 }
 
@@ -367,7 +381,7 @@ static void count_items(pl_states *states, pl_state *state)
         count = pl_add_saturating(count, pl_item_primitives(states, item));
         if (item->kind != PL_NODE_ENTER) continue;
         const pl_state *below = &states->list[item->what];
-        if (!below->open) state->singular = pl_add_saturating(state->singular, below->singular);
+        if (!below->open) state->bounds->singular = pl_add_saturating(state->bounds->singular, below->bounds->singular);
         if (below->depth > state->depth) state->depth = below->depth;
         state->endless = state->endless || below->endless;
     }
@@ -389,14 +403,14 @@ static void bound_items(builder *b, const open_state *open, bool in_cycle)
         pl_box box = pl_item_box_tight(states, item, &reach);
         if (pl_item_unbounded(states, item) || !(pl_box_is_empty(&box) || pl_box_is_finite(&box)))
             state->unbounded = true;
-        if (!in_cycle) pl_box_join(&state->box, &box);
-        pl_reach_join(&state->reach, &reach);
+        if (!in_cycle) pl_box_join(&state->bounds->box, &box);
+        pl_reach_join(&state->bounds->reach, &reach);
         if (states->node_boxes && !state->endless) pl_join_node_boxes(states, item, trail, trail_counts[i]);
         trail += trail_counts[i];
     }
-    state->reach.size = fmin(state->reach.size, 1.7320508075688774 * pl_box_reach(&state->box));
-    if (!in_cycle) state->gate = state->reach;
-    else pl_reach_join(&state->reach, &state->gate);
+    state->bounds->reach.size = fmin(state->bounds->reach.size, 1.7320508075688774 * pl_box_reach(&state->bounds->box));
+    if (!in_cycle) state->bounds->gate = state->bounds->reach;
+    else pl_reach_join(&state->bounds->reach, &state->bounds->gate);
 }
 
 /* Finishes the open states from `first` on, which lead to each other: all that they enter otherwise is finished. */
@@ -418,7 +432,7 @@ static bool finish_component(builder *b, size_t first)
         }
         int bound = pl_bound_component(states, members, (uint32_t)count, b->error);
         if (bound < 0) return false;
-        if (!bound) return fail_endless(b, states->list[*members].symbol, states->list[*members].key);
+        if (!bound) return fail_endless(b, states->list[*members].symbol, states->list[*members].bounds->key);
     }
     for (size_t i = 0; i < count; i++) {
         pl_state *state = &states->list[open[i].state];
@@ -427,9 +441,9 @@ static bool finish_component(builder *b, size_t first)
         bound_items(b, &open[i], cyclic);
         if (states->node_boxes && state->symbol != UINT32_MAX && !state->endless) pl_join_symbol_box(states, open[i].state);
         double square = 0.0;
-        for (int axis = 0; axis < 3 && !pl_box_is_empty(&state->box); axis++)
-            square += (state->box.hi[axis] - state->box.lo[axis]) * (state->box.hi[axis] - state->box.lo[axis]);
-        state->diameter = sqrt(square);
+        for (int axis = 0; axis < 3 && !pl_box_is_empty(&state->bounds->box); axis++)
+            square += (state->bounds->box.hi[axis] - state->bounds->box.lo[axis]) * (state->bounds->box.hi[axis] - state->bounds->box.lo[axis]);
+        state->bounds->diameter = sqrt(square);
     }
     for (size_t i = 0; i < count; i++) states->list[open[i].state].open = false;
     b->trails.count = open->trails;

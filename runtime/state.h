@@ -6,7 +6,7 @@
  *
  *     pl_states states;
  *     if (!pl_states_build(&states, program, meshes, &options, error)) …
- *     const pl_state *root = &states.list[0];        root->primitives, root->box, root->items[i].state …
+ *     const pl_state *root = &states.list[0];        root->primitives, root->bounds->box, root->items[i].state …
  *     pl_states_free(&states);
  *
  * Fig 2.1's tree has 2,049 cylinders and 13 states. Boxes are exact bottom-up unions in each state's own frame; counts
@@ -20,19 +20,29 @@
 #include "reach.h"
 #include "shapes/mesh.h"
 
+/* Where an item stands within its application. It is the same for items of the same path in all states of a symbol,
+ * and compared byte by byte: nothing of it is padding. */
+typedef struct pl_site {
+    int32_t rule;    /* the innermost rule, -1: none */
+    int32_t texture; /* the innermost texture node, -1: none … */
+    uint16_t texture_transforms; /* … below so many of the item's transformations … */
+    uint16_t texture_code;       /* … with values to be computed from parameters: 0 or 1 */
+    uint32_t term_count;
+    uint32_t terms[]; /* union terms */
+} pl_site;
+
 typedef struct pl_item {
-    uint8_t kind;          /* PL_NODE_PRIMITIVE, PL_NODE_MESH or PL_NODE_ENTER */
-    bool no_shadow : 1;    /* below no_shadow within this application */
-    bool texture_code : 1; /* `texture` has values to be computed from parameters */
-    uint16_t texture_transforms; /* `texture` is below so many of the transformations */
-    uint32_t what;   /* shape id, mesh index, or state index */
-    uint32_t transform_count, term_count;
+    uint32_t kind : 7;      /* PL_NODE_PRIMITIVE, PL_NODE_MESH or PL_NODE_ENTER */
+    uint32_t no_shadow : 1; /* below no_shadow within this application */
+    uint32_t transform_count : 24; /* no more than there are nodes */
+    uint32_t what;          /* shape id, mesh index, or state index */
     const pl_transform *const *transforms; /* outermost first */
-    const uint32_t *terms;                 /* union terms within this application */
-    double arguments[PL_SHAPE_ARGUMENTS];
+    const pl_site *site;
     uint64_t first; /* primitives of this state before this item */
-    int32_t rule;                /* the innermost rule within this application, -1: none */
-    int32_t texture;             /* the innermost texture node within it, -1: none */
+    union {
+        double arguments[PL_SHAPE_ARGUMENTS]; /* of a primitive */
+        const pl_transform *only; /* of what is entered, once packed: may be its list of transformations */
+    };
 } pl_item;
 
 /* The items on the way from the scene to a leaf. */
@@ -41,20 +51,26 @@ typedef struct pl_items {
     size_t count, capacity;
 } pl_items;
 
-typedef struct pl_state {
-    uint32_t symbol; /* node; UINT32_MAX: the scene */
-    uint32_t item_count;
-    const pl_item *items;
+/* What of a state is needed while structures are built over it; rays need it where there are cut-offs. */
+typedef struct pl_state_bounds {
     pl_box box;      /* of the bounded primitives, in this state's frame */
     double diameter; /* of the box */
     pl_reach reach;  /* by which the boxes of its items must be widened */
     pl_reach gate;   /* by which its own box must be; differs from reach only in endless states */
+    uint64_t singular;
+    const uint64_t *key;
+} pl_state_bounds;
+
+typedef struct pl_state {
+    uint32_t symbol; /* node; UINT32_MAX: the scene */
+    uint32_t item_count;
+    const pl_item *items;
+    pl_state_bounds *bounds; /* once packed NULL, but for the scene and where there are cut-offs */
+    uint64_t primitives;
+    uint32_t depth;  /* most symbols entered below, itself included; UINT32_MAX: endless */
     bool unbounded;  /* has unbounded primitives below */
     bool endless;    /* contains itself, or a state that does */
     bool open;       /* while building: its component isn't finished */
-    uint32_t depth;  /* most symbols entered below, itself included; UINT32_MAX: endless */
-    uint64_t primitives, singular;
-    const uint64_t *key;
 } pl_state;
 
 /* The union, over all instances, of a graph node's boxes in the node's own frame (paper, section 3, made conservative). */

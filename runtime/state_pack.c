@@ -2,7 +2,7 @@
  *
  *     forest of 10,000 trees: 4.4 MB of states -> 1.6 MB
  *
- * Lists of terms and of constant transformations are the same in many items, and are kept once. Where things are placed that
+ * Sites and lists of constant transformations are the same in many items, and are kept once. Where things are placed that
  * occur once, as a forest's trees, transformations are packed: a turn about an axis is 40 bytes instead of 104. The block
  * is laid out twice in the same order: for its size, then for good. */
 #include "state.h"
@@ -105,10 +105,16 @@ static size_t put_transform(packer *p, const pl_transform *transform, bool seldo
     return bytes ? put(p, &packed, bytes) : put(p, transform, TRACED_BYTES);
 }
 
-static const pl_transform *const *put_transforms(packer *p, const pl_item *item, bool seldom)
+/* The list of an item's transformations. Of what is entered through one of its own the item itself, at `place`, is the list. */
+static const pl_transform *const *put_transforms(packer *p, const pl_item *item, bool seldom, pl_item *place)
 {
     const size_t bytes = item->transform_count * sizeof *item->transforms;
     bool constant = true;
+    if (item->kind == PL_NODE_ENTER && item->transform_count == 1 && !is_constant(p, item->transforms[0])) {
+        const size_t offset = put_transform(p, item->transforms[0], seldom);
+        if (p->memory) place->only = (const pl_transform *)(p->memory + offset);
+        return &place->only;
+    }
     for (uint32_t i = 0; i < item->transform_count; i++) constant = constant && is_constant(p, item->transforms[i]);
     size_t list = constant ? put_shared(p, item->transforms, bytes) : put(p, item->transforms, bytes);
     for (uint32_t i = 0; i < item->transform_count; i++) {
@@ -129,15 +135,21 @@ static void lay_out(packer *p)
     for (uint32_t i = 0; i < states->count; i++) {
         pl_state *state = &states->list[i];
         for (uint32_t k = 0; k < state->item_count; k++) {
-            pl_item item = state->items[k];
-            size_t terms = put_shared(p, item.terms, item.term_count * sizeof *item.terms);
-            item.transforms = put_transforms(p, &item, p->once[i]);
-            if (!p->memory) continue;
-            item.terms = (const uint32_t *)(p->memory + terms);
-            ((pl_item *)(p->memory + items))[k] = item;
+            const pl_item *item = &state->items[k];
+            pl_item none, *place = p->memory ? (pl_item *)(p->memory + items) + k : &none;
+            const size_t site = put_shared(p, item->site, sizeof *item->site + item->site->term_count * sizeof *item->site->terms);
+            *place = *item;
+            place->transforms = put_transforms(p, item, p->once[i], place);
+            if (p->memory) place->site = (const pl_site *)(p->memory + site);
         }
         if (p->memory) state->items = (const pl_item *)(p->memory + items);
-        if (p->memory) state->key = NULL;
+        if (i == 0 || states->cuts) {
+            const size_t bounds = put(p, state->bounds, sizeof *state->bounds);
+            if (p->memory) state->bounds = (pl_state_bounds *)(p->memory + bounds);
+            if (p->memory) state->bounds->key = NULL;
+        } else if (p->memory) {
+            state->bounds = NULL;
+        }
         items += state->item_count * sizeof *state->items;
     }
     take(p, PL_PACKED_SIZES * sizeof(double)); /* as many are read of the last packed transformation, too */

@@ -252,8 +252,8 @@ static int64_t innermost_texture(const pl_items *items, bool *code)
     int64_t innermost = -1;
     *code = false;
     for (size_t i = 0; i < items->count; i++) {
-        if (items->list[i]->texture >= 0) innermost = (int64_t)i;
-        *code = *code || items->list[i]->texture_code;
+        if (items->list[i]->site->texture >= 0) innermost = (int64_t)i;
+        *code = *code || items->list[i]->site->texture_code;
     }
     return innermost;
 }
@@ -262,7 +262,7 @@ static int64_t innermost_texture(const pl_items *items, bool *code)
 static void take_items_texture(const pl_scene *scene, const pl_ray *ray, const pl_hit *hit, const pl_items *items,
                                size_t textured, pl_surface *surface)
 {
-    const pl_node *node = &scene->program->nodes[items->list[textured]->texture];
+    const pl_node *node = &scene->program->nodes[items->list[textured]->site->texture];
     const pl_record *record = &scene->program->records[node->as.texture.texture];
     double o[3], d[3];
     surface->texture = record->values;
@@ -272,7 +272,7 @@ static void take_items_texture(const pl_scene *scene, const pl_ray *ray, const p
     memcpy(d, ray->direction, sizeof d);
     for (size_t i = 0; i <= textured; i++) {
         const pl_item *item = items->list[i];
-        uint32_t count = i == textured ? item->texture_transforms : item->transform_count;
+        uint32_t count = i == textured ? item->site->texture_transforms : item->transform_count;
         for (uint32_t k = 0; k < count; k++) pl_map_ray(item->transforms[k], o, d);
     }
     for (int axis = 0; axis < 3; axis++) surface->pattern_point[axis] = o[axis] + hit->t * d[axis];
@@ -293,7 +293,7 @@ static void items_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hi
     if (leaf.smooth) map_normal_up(items, surface->flat);
     for (size_t i = items->count; i-- > 0;) {
         const pl_item *item = items->list[i];
-        if (leaf.rule < 0) leaf.rule = item->rule;
+        if (leaf.rule < 0) leaf.rule = item->site->rule;
         if (item->kind != PL_NODE_ENTER) continue;
         if (leaf.depth++ == 0) leaf.symbol = scene->states.list[item->what].symbol;
     }
@@ -308,7 +308,7 @@ static void items_cut(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, c
     const pl_scene *scene = tracer->scene;
     const pl_program *program = scene->program;
     int32_t rule = -1;
-    for (size_t i = items->count; i-- > 0 && rule < 0;) rule = items->list[i]->rule;
+    for (size_t i = items->count; i-- > 0 && rule < 0;) rule = items->list[i]->site->rule;
     begin_surface(tracer, ray, hit, surface);
     set_cut(scene, ray, hit, scene->states.list[items->list[items->count - 1]->what].symbol, rule, surface);
     if (told >= FIRST_NODE) {

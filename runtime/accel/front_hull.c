@@ -31,7 +31,7 @@ size_t pl_front_hulls_bytes(const pl_states *states)
 static bool has_hull(const pl_states *states, uint32_t state)
 {
     const pl_state *it = &states->list[state];
-    return !it->endless && !pl_box_is_empty(&it->box) && pl_box_is_finite(&it->box);
+    return !it->endless && !pl_box_is_empty(&it->bounds->box) && pl_box_is_finite(&it->bounds->box);
 }
 
 /* How many items' hulls are made from each state's: of states with fronts and of what is below them. */
@@ -57,7 +57,7 @@ static bool find_part(const pl_front_hulls *hulls, const pl_states *states, cons
         *part = pl_hull_of_shape(shape, item->arguments);
     } else {
         const pl_state *state = &states->list[item->what];
-        if (state->primitives == 0 || pl_box_is_empty(&state->box)) return false;
+        if (state->primitives == 0 || pl_box_is_empty(&state->bounds->box)) return false;
         *known = *known && hulls->of[item->what];
         if (!*known) return false;
         *part = *hulls->of[item->what];
@@ -121,7 +121,7 @@ void pl_front_hulls_free(pl_front_hulls *hulls, uint32_t states)
 pl_box pl_front_instance_box(const pl_front_hulls *hulls, const pl_states *states, const pl_item *item, const pl_affine *to_parent)
 {
     /* Where there are cut-offs the whole box may be drawn (cut.h). */
-    if (states->cuts) return pl_box_map(to_parent, &states->list[item->what].box);
+    if (states->cuts) return pl_box_map(to_parent, &states->list[item->what].bounds->box);
     if (hulls && hulls->of[item->what] && states->list[item->what].primitives > FEW) {
         const pl_box box = pl_hull_box_under(to_parent, hulls->of[item->what]);
         if (pl_box_is_finite(&box)) return box;

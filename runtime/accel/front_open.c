@@ -134,7 +134,7 @@ static double length(const double v[3])
 
 double pl_front_scale(const pl_states *states, uint32_t state)
 {
-    const pl_box *box = &states->list[state].box;
+    const pl_box *box = &states->list[state].bounds->box;
     double half = 0.0;
     if (pl_box_is_empty(box) || !pl_box_is_finite(box)) return 1.0;
     for (int axis = 0; axis < 3; axis++) half = fmax(half, 0.5 * box->hi[axis] - 0.5 * box->lo[axis]);
@@ -144,10 +144,10 @@ double pl_front_scale(const pl_states *states, uint32_t state)
 /* Slack: reach.h's (twice: boxes here are composed too), and moving a ray along itself to a front's box. */
 void pl_front_set_frame(pl_front *front, const pl_states *states, uint32_t state)
 {
-    const pl_box *box = &states->list[state].box;
+    const pl_box *box = &states->list[state].bounds->box;
     front->state = state;
     front->box = *box;
-    front->reach = states->list[state].reach;
+    front->reach = states->list[state].bounds->reach;
     memset(front->centre, 0, sizeof front->centre);
     front->scale = pl_front_scale(states, state);
     front->framed = !pl_box_is_empty(box) && pl_box_is_finite(box);

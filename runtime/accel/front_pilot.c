@@ -155,7 +155,7 @@ static void cross(flight *f, const pl_box *box, uint64_t number)
 
 static void fly(flight *f)
 {
-    const pl_box *box = &f->compositions->states->list[0].box;
+    const pl_box *box = &f->compositions->states->list[0].bounds->box;
     const bool chords = !pl_box_is_empty(box) && pl_box_is_finite(box);
     pl_camera camera;
     const bool looks = pl_camera_create(pl_scene_camera(f->scene), &camera, NULL);

@@ -161,8 +161,8 @@ static double probability(const pl_front_plan *plan, const pl_pilot *pilot, uint
     const pl_states *states = plan->compositions->states;
     const pl_item *item = &states->list[state].items[index];
     const size_t at = plan->compositions->first[state] + index;
-    const double whole = pl_box_area(&states->list[state].box);
-    const pl_box box = pl_box_map(&plan->compositions->list[at].to_parent, &states->list[item->what].box);
+    const double whole = pl_box_area(&states->list[state].bounds->box);
+    const pl_box box = pl_box_map(&plan->compositions->list[at].to_parent, &states->list[item->what].bounds->box);
     double share = states->list[item->what].unbounded ? 1.0 : pl_box_area(&box) / whole;
     if (!(share < 1.0)) share = 1.0;
     return pilot ? (pilot->entries[at] + PRIOR_VISITS * share) / (pilot->visits[state] + PRIOR_VISITS) : share;

@@ -30,9 +30,9 @@ typedef struct building {
 
 static bool is_within(const pl_box *inner, const pl_state *outer)
 {
-    const double tolerance = NEARLY * outer->diameter;
+    const double tolerance = NEARLY * outer->bounds->diameter;
     for (int axis = 0; axis < 3; axis++)
-        if (!(inner->lo[axis] >= outer->box.lo[axis] - tolerance && inner->hi[axis] <= outer->box.hi[axis] + tolerance))
+        if (!(inner->lo[axis] >= outer->bounds->box.lo[axis] - tolerance && inner->hi[axis] <= outer->bounds->box.hi[axis] + tolerance))
             return false;
     return true;
 }
@@ -48,12 +48,12 @@ static bool is_nested(const pl_states *states, const pl_state *state, const pl_i
         to_parent = pl_affine_multiply(&to_parent, &item->transforms[i]->to_parent);
         to_object = pl_affine_multiply(&item->transforms[i]->to_object, &to_object);
     }
-    pl_box box = pl_box_map(&to_parent, &below->box);
+    pl_box box = pl_box_map(&to_parent, &below->bounds->box);
     if (!is_within(&box, state)) return false;
     const double m = pl_largest_stretch(&to_parent), n = pl_largest_stretch(&to_object);
     const double *move = to_object.m;
     const double offset = sqrt(move[3] * move[3] + move[7] * move[7] + move[11] * move[11]);
-    const pl_reach *inner = &below->gate, *outer = &state->gate;
+    const pl_reach *inner = &below->bounds->gate, *outer = &state->bounds->gate;
     return m * n * inner->gain <= 3.0 * outer->gain && m * (inner->gain * offset + inner->base) <= 3.0 * outer->base;
 }
 
@@ -81,8 +81,8 @@ static double farthest_of(const pl_state *state, const pl_affine *to_object)
     if (!state->endless) return INFINITY;
     const double *m = to_object->m;
     const double offset = sqrt(m[3] * m[3] + m[7] * m[7] + m[11] * m[11]);
-    const double most = state->diameter / (PL_CUT_BLUR * DBL_EPSILON) - state->gate.base - state->gate.gain * offset;
-    return 0.99 * most / (state->gate.gain * pl_largest_stretch(to_object));
+    const double most = state->bounds->diameter / (PL_CUT_BLUR * DBL_EPSILON) - state->bounds->gate.base - state->bounds->gate.gain * offset;
+    return 0.99 * most / (state->bounds->gate.gain * pl_largest_stretch(to_object));
 }
 
 /* A distance from the origin of a front's state, as one from the centre of its unit frame. */
@@ -97,8 +97,8 @@ static float in_unit_frame(const pl_front *front, double distance)
 static void extend(pl_gated_link *link, const pl_item *item)
 {
     for (uint32_t i = 0; i < item->transform_count; i++) link->stretch *= item->transforms[i]->stretch;
-    for (uint32_t i = 0; i < item->term_count; i++) link->power *= PL_CUT_BASE;
-    link->hash = pl_cut_hash(link->hash, item->terms, item->term_count);
+    for (uint32_t i = 0; i < item->site->term_count; i++) link->power *= PL_CUT_BASE;
+    link->hash = pl_cut_hash(link->hash, item->site->terms, item->site->term_count);
     link->depth++;
 }
 
@@ -129,7 +129,7 @@ static bool set_gates(building *b, pl_gated_rung *rung, uint32_t opened_count)
         for (uint32_t k = 0; k < by->transform_count; k++)
             ways[i].to_object = pl_affine_multiply(&by->transforms[k]->to_object, &ways[i].to_object);
         if (state->unbounded) continue;
-        rung->least = fmin(rung->least, state->diameter * ways[i].link.stretch);
+        rung->least = fmin(rung->least, state->bounds->diameter * ways[i].link.stretch);
         farthest = fmin(farthest, farthest_of(state, &ways[i].to_object));
     }
     rung->farthest = in_unit_frame(front, farthest);
@@ -168,7 +168,7 @@ static bool add_rungs(building *b, uint32_t index, uint64_t most)
     const pl_state *it = &b->scene->states.list[index];
     const pl_affine identity = pl_affine_identity();
     state->first = b->gated->count;
-    state->diameter = it->diameter;
+    state->diameter = it->bounds->diameter;
     state->unbounded = it->unbounded;
     for (; most >= LEAST_ITEMS && most > it->item_count; most /= RATIO)
         if (!add_rung(b, index, most)) return false;

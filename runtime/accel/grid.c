@@ -234,7 +234,7 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     const pl_scene *scene = tracer->scene;
     const pl_grid *grid = scene->structure;
     work *w = tracer->work;
-    double slack = pl_reach_slack(&scene->states.list[0].reach, ray->origin), t;
+    double slack = pl_reach_slack(&scene->states.list[0].bounds->reach, ray->origin), t;
     w->ray++;
     if (grid->size[0] == 0 || !is_in_reach(scene, ray, slack))
         return pl_walk_trace(w->walk, scene, &tracer->counters, ray, query, pl_walk_misses_box);

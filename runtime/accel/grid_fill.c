@@ -363,7 +363,7 @@ static bool find_depth_limit(filling *f)
  * would leave the range of numbers. */
 static void lay_out(const pl_scene *scene, pl_grid *grid)
 {
-    const pl_box *box = &scene->states.list[0].box;
+    const pl_box *box = &scene->states.list[0].bounds->box;
     double widest = 0.0;
     if (pl_box_is_empty(box) || !pl_box_is_finite(box)) return;
     for (int axis = 0; axis < 3; axis++) widest = fmax(widest, box->hi[axis] - box->lo[axis]);

@@ -18,9 +18,11 @@ bool pl_query_fail_steps(const pl_query *query, uint64_t limit)
 bool pl_items_path(const pl_items *items, pl_path *path)
 {
     uint32_t length = 0;
-    for (size_t i = 0; i < items->count; i++)
-        for (uint32_t k = 0; k < items->list[i]->term_count; k++)
-            if (!pl_path_push(path, length++, items->list[i]->terms[k])) return false;
+    for (size_t i = 0; i < items->count; i++) {
+        const pl_site *site = items->list[i]->site;
+        for (uint32_t k = 0; k < site->term_count; k++)
+            if (!pl_path_push(path, length++, site->terms[k])) return false;
+    }
     path->length = length;
     return true;
 }
@@ -167,7 +169,7 @@ bool pl_query_cut(pl_query *query, const pl_states *states, const pl_arrival *at
     const double share = pl_coverage_of(states, at->state, at->d);
     if (share < 0.0) return pl_fail_memory(query->error, "measuring coverages");
     if (!(pl_cut_chance(hash, at->depth, query->ray) < share)) return true;
-    return keep_cut(query, states->list[at->state].diameter, at, t_entry, leaf);
+    return keep_cut(query, states->list[at->state].bounds->diameter, at, t_entry, leaf);
 }
 
 bool pl_query_cut_box(pl_query *query, const pl_gate_box *box, double coverage, const pl_arrival *at, uint64_t hash,

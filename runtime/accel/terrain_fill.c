@@ -375,11 +375,12 @@ static pl_reach reach_of(const bounds *b)
 
 static bool set_frame(pl_terrain *terrain, const bounds *b)
 {
-    pl_state state = {.box = b->box, .reach = reach_of(b)};
+    pl_state_bounds bounds = {.box = b->box, .reach = reach_of(b)};
+    pl_state state = {.bounds = &bounds};
     const pl_states states = {.list = &state};
     pl_front_set_frame(&terrain->front, &states, 0);
     terrain->front.wide = PL_TERRAIN_WIDE;
-    return terrain->front.framed && isfinite(state.reach.base) && terrain->front.scale < 1e300;
+    return terrain->front.framed && isfinite(bounds.reach.base) && terrain->front.scale < 1e300;
 }
 
 /* Nodes on the longest way down a tree. */

@@ -411,7 +411,7 @@ static bool list_places(const pl_scene *scene, pl_terrains *terrains, pl_walk *w
 /* -1, 0 or 1: the order in which an item of the scene and a terrain stand there. */
 static int compare_places(const pl_item *item, const pl_terrain_place *place)
 {
-    const pl_path a = {(uint32_t *)item->terms, item->term_count, 0}, b = {place->terms, place->term_count, 0};
+    const pl_path a = {(uint32_t *)item->site->terms, item->site->term_count, 0}, b = {place->terms, place->term_count, 0};
     return pl_path_compare(&a, &b);
 }
 
