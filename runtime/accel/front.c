@@ -15,8 +15,8 @@ enum { DEFAULT_CACHE = 1 << 20, LARGE_FRONT = 1 << 14, MOST_THREADS = 64 };
 /* Of a core's second-level cache, what states and fronts may take unless something else is asked for: what rays keep
  * touching should stay there (engine measurements: residency, not arithmetic, decides), beside stacks and pixels. */
 #define CACHE_SHARE 0.45
-/* Where the graph itself is larger than that: so much of what it needs. Here rays wait for memory as it is, so taller fronts win
- * (forest: 65 instead of 97, a tenth faster). */
+/* Where the graph itself is larger than that: so much of what it needs. Rays wait for memory there as it is, so taller fronts
+ * win (forest: 65 instead of 97, a tenth faster). */
 #define LEAST_GROWTH 1.85
 /* What there may be at once while building: a process that traces takes SPARE more than its scene anyway. */
 #define SPARE (256 << 10)
