@@ -35,6 +35,8 @@ typedef struct pl_spotted {
     double point[3], normal[3]; /* turned against the ray */
     double flat[3];             /* the surface's own normal, to either side */
     double width;               /* of the pixel's footprint here */
+    const pl_hit *hit;
+    bool convex;                /* as of pl_surface */
     double epsilon;             /* rounding error of the point, in our own tolerances */
     pl_pigment pigment;
     pl_finish finish;
@@ -59,10 +61,10 @@ struct pl_shader {
     /* Rays that are traced together, and what they meet: those of the eye, of one bounce, or towards one light. */
     pl_ray traced[PL_TRACE_MANY];
     pl_ray eye_rays[PL_TRACE_MANY]; /* as eyes: all but their directions is the same for all samples */
-    pl_hit hits[PL_TRACE_MANY];
     bool blocked[PL_TRACE_MANY];
     /* Samples that are shaded together, and those of their hits that a light shines on. */
     pl_bounce eyes[PL_SHADE_MANY];
+    pl_hit hits[PL_SHADE_MANY];
     pl_spotted spotted[PL_SHADE_MANY];
     pl_shine shines[PL_SHADE_MANY], *sorted[PL_SHADE_MANY];
 };
@@ -111,6 +113,7 @@ static void set_ray(const pl_view *view, const pl_bounce *bounce, pl_ray *ray)
     ray->t_min = bounce->t_min;
     ray->t_max = view->povray_epsilon ? POVRAY_FARTHEST : INFINITY;
     ray->shadow = false;
+    ray->leaves = NULL;
     ray->width = bounce->width;
     ray->spread = view->spread;
 }
@@ -141,7 +144,7 @@ pl_shader *pl_shader_create(const pl_view *view, pl_error *error)
         return NULL;
     }
     shader->view = view;
-    for (int i = 0; i < PL_TRACE_MANY; i++) pl_hit_init(&shader->hits[i]);
+    for (int i = 0; i < PL_SHADE_MANY; i++) pl_hit_init(&shader->hits[i]);
     for (int i = 0; i < PL_SHADE_MANY; i++) set_eye(view, &shader->eyes[i]);
     for (int i = 0; i < PL_TRACE_MANY; i++) set_ray(view, &shader->eyes[i], &shader->eye_rays[i]);
     shader->tracer = pl_tracer_create(view->scene, error);
@@ -154,7 +157,7 @@ void pl_shader_destroy(pl_shader *shader)
 {
     if (!shader) return;
     if (shader->tracer) pl_tracer_destroy(shader->tracer);
-    for (int i = 0; i < PL_TRACE_MANY; i++) pl_hit_free(&shader->hits[i]);
+    for (int i = 0; i < PL_SHADE_MANY; i++) pl_hit_free(&shader->hits[i]);
     free(shader->waiting);
     free(shader);
 }
@@ -241,6 +244,7 @@ static bool set_shadow_ray(const pl_shader *shader, const pl_shine *shine, pl_ra
     ray->t_min = view->povray_epsilon ? POVRAY_SHADOW : 0.0;
     ray->t_max = view->povray_epsilon ? fmin(shine->distance - POVRAY_SHADOW, POVRAY_FARTHEST) : shine->distance - at->epsilon;
     ray->shadow = true;
+    ray->leaves = at->convex && !view->povray_epsilon && pl_dot(ray->direction, at->flat) > 0.0 ? at->hit : NULL;
     ray->width = at->width;
     ray->spread = view->spread;
     return ray->t_min < ray->t_max;
@@ -451,6 +455,7 @@ static bool spot(const pl_bounce *bounce, const pl_ray *ray, double t, const pl_
 {
     at->ray = bounce;
     at->depth = t;
+    at->convex = surface->convex;
     at->epsilon = pl_hit_epsilon(surface, ray, t);
     at->width = ray->width + ray->spread * t;
     pl_texture_finish(surface->texture, &at->finish);
@@ -502,14 +507,15 @@ static bool light_hits(pl_shader *shader, pl_spotted *spotted, unsigned count, p
 }
 
 /* Finds what the rays of some bounces meet; *found: how many do. */
-static bool spot_many(pl_shader *shader, const pl_bounce *bounces, const pl_ray *rays, unsigned count, pl_spotted *spotted,
-                      unsigned *found, pl_first *first, pl_error *error)
+static bool spot_many(pl_shader *shader, const pl_bounce *bounces, const pl_ray *rays, unsigned count, pl_hit *hits,
+                      pl_spotted *spotted, unsigned *found, pl_first *first, pl_error *error)
 {
-    if (pl_trace_nearest_many(shader->tracer, rays, count, shader->hits, error) < count) return false;
+    if (pl_trace_nearest_many(shader->tracer, rays, count, hits, error) < count) return false;
     for (unsigned i = 0; i < count; i++) {
         const pl_ray *ray = &rays[i];
-        pl_hit *hit = &shader->hits[i];
+        pl_hit *hit = &hits[i];
         pl_surface surface;
+        spotted[i].hit = hit;
         spotted[i].found = hit->t != INFINITY;
         if (spotted[i].found && !(pl_trace_surface(shader->tracer, ray, hit, &surface, error) &&
                                   spot(&bounces[i], ray, hit->t, &surface, &spotted[i], error)))
@@ -527,7 +533,8 @@ static bool spot_all(pl_shader *shader, const double (*directions)[3], unsigned 
     for (unsigned from = 0; from < count; from += PL_TRACE_MANY) {
         const unsigned some = count - from < PL_TRACE_MANY ? count - from : PL_TRACE_MANY;
         look(shader, from, some, directions + from);
-        if (!spot_many(shader, shader->eyes + from, shader->eye_rays, some, shader->spotted + from, &found, first, error))
+        if (!spot_many(shader, shader->eyes + from, shader->eye_rays, some, shader->hits + from, shader->spotted + from, &found,
+                       first, error))
             return false;
     }
     return found == 0 || light_hits(shader, shader->spotted, count, error);
@@ -550,7 +557,7 @@ static bool follow_all(pl_shader *shader, double color[3], pl_error *error)
         pl_spotted at;
         unsigned found = 0;
         set_ray(shader->view, &bounce, &ray);
-        if (!spot_many(shader, &bounce, &ray, 1, &at, &found, NULL, error)) return false;
+        if (!spot_many(shader, &bounce, &ray, 1, shader->hits, &at, &found, NULL, error)) return false;
         if (found && !light_hits(shader, &at, 1, error)) return false;
         if (!collect(shader, &bounce, &at, color, error)) return false;
     }

@@ -112,6 +112,7 @@ static void finish_surface(const pl_scene *scene, const leaf_surface *leaf, cons
     surface->symbol = leaf->symbol == UINT32_MAX ? -1 : (int32_t)scene->program->nodes[leaf->symbol].symbol;
     surface->rule = leaf->rule;
     surface->depth = (int32_t)leaf->depth;
+    surface->convex = leaf->shape && leaf->shape->convex;
 }
 
 static void begin_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface)
@@ -177,6 +178,7 @@ static void set_cut(const pl_scene *scene, const pl_ray *ray, const pl_hit *hit,
     surface->symbol = (int32_t)scene->program->nodes[symbol].symbol;
     surface->rule = rule;
     surface->depth = (int32_t)hit->cut_depth;
+    surface->convex = false;
 }
 
 /* Where a cut instance's state keeps what was found below it. NULL: no memory. */

@@ -69,10 +69,14 @@ static void begin_query(pl_query *query, pl_tracer *tracer, const pl_ray *ray, p
     query->t_min = ray->t_min;
     query->t_max = ray->t_max;
     query->shadow = ray->shadow;
+    query->leaves = NULL;
     query->found = query->done = false;
     query->tracer = tracer;
     query->error = error;
-    if (!tracer->scene->states.cuts && !tracer->scene->gates) return;
+    if (!tracer->scene->states.cuts && !tracer->scene->gates) { /* what is cut has no surface to go away from */
+        if (kind == PL_QUERY_ANY) query->leaves = ray->leaves;
+        return;
+    }
     const double px = tracer->scene->detail;
     query->length = sqrt(pl_dot(ray->direction, ray->direction));
     query->footprint = (pl_footprint){px * ray->width, px * ray->spread, px * ray->width / query->length};

@@ -16,6 +16,7 @@ typedef struct pl_ray {
     double origin[3], direction[3];
     double t_min, t_max; /* hits at t_min < t < t_max count */
     bool shadow;         /* skip what stands below no_shadow */
+    const struct pl_hit *leaves; /* pl_trace_any: a hit whose primitive the ray goes away from and can't meet; or NULL */
     double width, spread; /* a pixel's width at t, in scene units: width + spread * t; 0: all is as near as can be */
 } pl_ray;
 
@@ -46,6 +47,7 @@ typedef struct pl_surface {
     double pattern_point[3]; /* the hit point in the frame where the texture stands (before its own matrix), where that has a
                                 pattern */
     int32_t symbol, rule, depth;
+    bool convex; /* a ray that starts outside and goes away from it doesn't meet its primitive again */
 } pl_surface;
 
 pl_tracer *pl_tracer_create(const pl_scene *scene, pl_error *error);

@@ -29,6 +29,7 @@ typedef struct pl_query {
     uint64_t ray;           /* … and its key (pl_cut_ray) */
     bool shadow;         /* skip what stands below no_shadow */
     bool found, done;    /* done: no more leaves are wanted */
+    const pl_hit *leaves; /* any: its primitive doesn't count (pl_ray); or NULL */
     pl_hit *hit;         /* nearest: the best so far */
     pl_tracer *tracer; /* all: its list */
     pl_error *error;

@@ -102,6 +102,15 @@ bool pl_bvh_offer(pl_tracer *tracer, const pl_bvh_lane *lane, uint32_t frame, pl
 /* The transformations on the way from a front's state to an item of an opened node, into work->chain, the last one first. */
 bool pl_bvh_chain(pl_bvh_work *work, const pl_front *front, uint32_t opened, const pl_item *item, size_t *count, pl_error *error);
 
+/* Whether a primitive of a frame is the one that the ray leaves (pl_ray): it needn't be evaluated. */
+static inline bool pl_bvh_is_left(const pl_hit *hit, const pl_frame *frames, uint32_t frame, pl_ref ref)
+{
+    if (!hit || hit->trail.length != frame + 1 || hit->trail.terms[frame] != ref) return false;
+    for (uint32_t i = 0; i < frame; i++)
+        if (hit->trail.terms[i] != frames[i + 1].instance) return false;
+    return true;
+}
+
 /* Room for one more frame, for eight more entries above `top`; false: no memory. */
 bool pl_bvh_grow_frames(pl_bvh_lane *lane, size_t count, pl_error *error);
 bool pl_bvh_grow_stack(pl_bvh_lane *lane, size_t top, pl_error *error);

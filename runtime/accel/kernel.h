@@ -371,7 +371,8 @@ static inline __attribute__((always_inline)) enum kernel_verdict judge(pl_tracer
     const pl_front_primitive *p = &k->f->front->primitives[ref & PL_REF_INDEX];
     if (k->query->shadow && p->item & PL_NO_SHADOW) return MISS;
     tracer->counters.filtered++;
-    return filter(p, ref >> PL_REF_SHIFT, k->f, k->t_max, any);
+    const enum kernel_verdict verdict = filter(p, ref >> PL_REF_SHIFT, k->f, k->t_max, any);
+    return any && verdict != MISS && pl_bvh_is_left(k->query->leaves, k->lane->frames, k->frame, ref) ? MISS : verdict;
 }
 
 /* A primitive that may be met, or must be. */

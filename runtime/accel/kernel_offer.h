@@ -103,6 +103,17 @@ static bool map_packet(const pl_scene *scene, pl_bvh_work *w, uint32_t index, un
     return true;
 }
 
+/* Those of some lanes whose rays don't leave a primitive. */
+static inline unsigned lanes_that_stay(const pl_bvh_work *w, uint32_t index, pl_ref ref, const pl_query *queries, unsigned lanes)
+{
+    unsigned stay = lanes;
+    for (unsigned rest = lanes; rest; rest &= rest - 1) {
+        const int lane = __builtin_ctz(rest);
+        if (pl_bvh_is_left(queries[lane].leaves, w->lanes->frames, index, ref)) stay &= ~(1u << lane);
+    }
+    return stay;
+}
+
 /* Evaluates a primitive of frame `index` for some lanes and offers it to their queries. */
 static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned lanes, pl_query *queries, double *t_max)
 {

@@ -392,8 +392,8 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
             const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
             if (shadow && p->item & PL_NO_SHADOW) continue;
             tracer->counters.filtered++;
-            unsigned certain = 0;
-            const unsigned found = filter_lanes(p, kind, f, f->lanes, any ? &certain : NULL);
+            unsigned certain = 0, found = filter_lanes(p, kind, f, f->lanes, any ? &certain : NULL);
+            if (any) certain &= found = lanes_that_stay(w, index, ref, queries, found);
             if (!found) continue;
             for (unsigned rest = certain; rest; rest &= rest - 1) {
                 pl_query *query = &queries[__builtin_ctz(rest)];

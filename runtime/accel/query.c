@@ -107,17 +107,32 @@ static bool keep_listed(pl_query *query, const pl_leaf *leaf, const pl_root *roo
     return true;
 }
 
+/* Whether a leaf is the primitive that the ray leaves: without cut-offs each has one trail. -1: no memory. */
+static int is_left(pl_query *query, const pl_leaf *leaf)
+{
+    const pl_hit *hit = query->leaves;
+    pl_path *place = &query->tracer->scratch;
+    if (!hit) return false;
+    if (!(leaf->trail ? leaf->trail(leaf->source, place) : leaf->path(leaf->source, place))) return -1;
+    return pl_path_compare(place, leaf->trail ? &hit->trail : &hit->path) == 0;
+}
+
+/* One is enough: what goes together with others' rays needn't go on. */
+static bool keep_any(pl_query *query, const pl_leaf *leaf)
+{
+    const int left = is_left(query, leaf);
+    if (left < 0) return pl_fail_memory(query->error, "tracing a ray");
+    if (left) return true;
+    query->found = query->done = true;
+    query->t_max = query->t_min;
+    return true;
+}
+
 static bool keep(pl_query *query, const pl_leaf *leaf, const pl_root *root)
 {
+    if (query->kind == PL_QUERY_ANY) return keep_any(query, leaf);
     query->found = true;
-    switch (query->kind) {
-    case PL_QUERY_NEAREST: return keep_nearest(query, leaf, root);
-    case PL_QUERY_ALL: return keep_listed(query, leaf, root);
-    default: /* one is enough: what goes together with others' rays needn't go on */
-        query->done = true;
-        query->t_max = query->t_min;
-        return true;
-    }
+    return query->kind == PL_QUERY_NEAREST ? keep_nearest(query, leaf, root) : keep_listed(query, leaf, root);
 }
 
 typedef struct mesh_visit {

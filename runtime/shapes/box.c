@@ -25,4 +25,4 @@ static void normal(const double *arguments, int32_t part, const double p[3], dou
     for (int axis = 0; axis < 3; axis++) n[axis] = part / 2 != axis ? 0.0 : part % 2 ? 1.0 : -1.0;
 }
 
-const pl_shape pl_box_shape = {support, roots, normal, NULL};
+const pl_shape pl_box_shape = {support, roots, normal, NULL, true};

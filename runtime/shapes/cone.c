@@ -72,4 +72,4 @@ static const char *check(const double *arguments)
     return arguments[0] >= 0.0 && isfinite(arguments[0]) ? NULL : "the top radius of a cone must be 0 or more";
 }
 
-const pl_shape pl_cone = {support, roots, normal, check};
+const pl_shape pl_cone = {support, roots, normal, check, true};

@@ -48,4 +48,4 @@ static void normal(const double *arguments, int32_t part, const double p[3], dou
     n[2] = part == SIDE ? 0.0 : part == TOP ? 1.0 : -1.0;
 }
 
-const pl_shape pl_cylinder = {support, roots, normal, NULL};
+const pl_shape pl_cylinder = {support, roots, normal, NULL, true};

@@ -10,6 +10,7 @@
  *                        passes there. A solid gives its entries and exits: it is closed, so the roots of a ray from
  *                        outside come in pairs, also where it runs through an edge. NaN never counts as a root.
  * normal(…)              the outward normal at a root's point (any positive length); flat shapes: +z.
+ * convex                 a ray that leaves it doesn't meet it again.
  * check(arguments)       NULL if the arguments are legal, else what was expected.
  *
  * To add a shape: a row in bytecode.toml, a file here with its `const pl_shape`, a line in the table of shape.c. */
@@ -34,6 +35,7 @@ typedef struct pl_shape {
                  pl_root roots[PL_SHAPE_ROOTS]);
     void (*normal)(const double *arguments, int32_t part, const double p[3], double n[3]);
     const char *(*check)(const double *arguments);
+    bool convex;
 } pl_shape;
 
 extern const pl_shape pl_sphere, pl_cylinder, pl_cone, pl_box_shape, pl_torus, pl_triangle, pl_square, pl_disc,

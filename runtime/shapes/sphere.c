@@ -33,4 +33,4 @@ static void normal(const double *arguments, int32_t part, const double p[3], dou
     for (int axis = 0; axis < 3; axis++) n[axis] = p[axis];
 }
 
-const pl_shape pl_sphere = {support, roots, normal, NULL};
+const pl_shape pl_sphere = {support, roots, normal, NULL, true};

@@ -20,4 +20,4 @@ static int roots(const double *arguments, const double o[3], const double d[3], 
     return 1;
 }
 
-const pl_shape pl_square = {support, roots, pl_flat_normal, NULL};
+const pl_shape pl_square = {support, roots, pl_flat_normal, NULL, true};

@@ -138,4 +138,4 @@ static const char *check(const double *arguments)
     return arguments[0] > 0.0 && isfinite(arguments[0]) ? NULL : "the minor radius of a torus must be above 0";
 }
 
-const pl_shape pl_torus = {support, roots, normal, check};
+const pl_shape pl_torus = {support, roots, normal, check, false};

@@ -122,6 +122,28 @@ def test_no_facet_shadows_itself_however_grazing_the_light(tilt, elevation):
         assert (light > 0).all(), (scale, move)
 
 
+@pytest.mark.parametrize("accelerator", ["none", "boxes", "grid", "bvh"])
+def test_solids_shadow_themselves_where_rays_go_through_them(accelerator):
+    """A convex solid can't be met by a ray that goes away from it; one that goes inside, or is concave, can."""
+
+    def drawn(solid: str, eye: str, target: str, light: str, angle: float = 20) -> np.ndarray:
+        text = (
+            f"camera {{ location {eye} sky <0, 0, 1> right <-4/3, 0, 0> look_at {target} angle {angle} }}\n"
+            f"light_source {{ {light} color rgb 1 }}\nobject {{ S {WHITE} }}\nSelection S {{ S -> {solid}; }}\n"
+        )
+        with Scene(compile(text), accelerator=accelerator) as scene:
+            return scene.render(32, 24, channels=("color",))["color"][..., 0]
+
+    for solid in ("sphere", "[ trans -1 -1 -1; scale 2 2 2 ] box", "[ trans 0 0 -1; scale 1 1 2 ] cylinder"):
+        ball = f"{solid} + [ trans 9 0 0 ] {solid}"
+        assert (drawn(ball, "<0, 0, 0>", "<-1, 0.1, 0.2>", "<50, 0, 0>") == 0).all(), solid
+        assert (drawn(ball, "<0, 0, 0>", "<-1, 0.1, 0.2>", "<0.5, 0, 0>") > 0).all(), solid
+        assert (drawn(ball, "<-9, 0.1, 0.2>", "<0, 0.1, 0.2>", "<-50, 0, 0>").max()) > 0.9, solid
+        assert (drawn(ball, "<4.5, 0, 0.1>", "<9, 0, 0.1>", "<-50, 0, 0>") == 0).all(), solid
+    ring = [drawn("torus(0.25)", "<-0.8, 0.001, 9>", "<-0.8, 0, 0>", light, 0.5) for light in ("<50, 0, 0>", "<0, 0, 0>")]
+    assert ring[0].max() == 0 < ring[1].min()
+
+
 def test_smooth_mirrors_reflect_what_is_around_them_and_not_themselves():
     text = """
     camera { location <0, -5, 1e-4> sky <0, 0, 1> right <-4/3, 0, 0> look_at <0, 0, 0> angle 20 }
