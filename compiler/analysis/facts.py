@@ -55,8 +55,8 @@ class Definition(NamedTuple):
 
 @dataclass(eq=False)
 class Facts:
-    """See the module. They stay the same object while letters are typed into the block's names (retouch.py). ``text`` is what was parsed; ``definitions`` are those that
-    name something; ``blocks`` are scene blocks; ``assigned`` are the names that get values, in text order; ``ghosts`` are
+    """See the module. They stay the same object while one token at a time is edited (retouch.py). ``text`` is what was parsed;
+    ``definitions`` are those that name something; ``blocks`` are scene blocks; ``assigned`` are the names that get values, in text order; ``ghosts`` are
     definitions of an earlier text that this one has lost to a syntax error; ``spans`` are all places in ``file``, if
     there are no messages in ``syntax``; ``right`` is the last text that nothing was wrong
     with, and when that was (Namespace.now)."""
@@ -83,6 +83,12 @@ class Facts:
     def retouched(self) -> None:
         """The text has changed, and with it all else but the tree."""
         self.text, self._tree = self.file.span.source.data, None
+        self.__dict__.pop("is_broken", None)
+
+    def forget_names(self) -> None:
+        """A word has changed that may have been no name of the scene's, or none any more."""
+        for each in ("names", "definitions", "assigned"):
+            self.__dict__.pop(each, None)
 
     @lazy_property
     def definitions(self) -> list[Definition]:

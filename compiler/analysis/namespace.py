@@ -89,8 +89,17 @@ class Namespace:
         if all(name.name != before for name in facts.names):
             self._drop(self.users, before, facts)
         self.users.setdefault(after, {})[facts] = None
+        self.learn_value(facts)
+
+    def learn_value(self, facts: Facts, is_other: bool = False) -> None:
+        """What ``facts`` say of their definitions has changed, but no name; ``is_other``: so has whether they are broken."""
         for definition in facts.definitions:
             if definition.kind in _VALUES:
+                self._touched[definition.name] = None
+            elif definition.kind == "calculation" and is_other:
+                self._drop(self._unfinished, definition.name, facts)
+                if facts.is_broken:
+                    self._unfinished.setdefault(definition.name, {})[facts] = None
                 self._touched[definition.name] = None
 
     @property
@@ -130,7 +139,7 @@ class Namespace:
             if entry is not None:
                 self._names[entry.kind].remove(name)
                 del self.entries[name]
-        elif entry is None or entry.node is not node:
+        elif entry is None or entry.node is not node or entry.kind != kind:
             span = node.span if isinstance(node, syntax.Name) else node.name.span
             definition = ModelDefinition(name, kind, span, _Nothing(), _Nothing())
             self.entries[name] = Entry(definition, node)

@@ -1,9 +1,10 @@
-"""Letters typed into a name: what was read from the block before, with the name changed and what follows it moved.
+"""What is typed into one token, white space or a comment: what was read from the block before, with that token changed and what
+follows it moved.
 
-Most keys of an editing session go into a name. The text then has the same tokens as before, so that its syntax tree is the
-same but for one name and for the places behind it: nothing needs to be parsed or read again. Where anything else may
-follow from the edit, it isn't done here: in words that mean something of their own, in what has messages, or where the
-reader looks at columns.
+Most keys of an editing session go into a name or a number. The text then has the same tokens as before, so that its syntax
+tree is the same but for one leaf and for the places behind it: nothing needs to be parsed or read again. Where anything else
+may follow from the edit, it isn't done here: in words that mean something to the grammar, in what has messages (but those
+about the number itself), or where the reader looks at columns.
 
 Example: of ``Transformation T { roty angel; scale 2; }`` read before, one letter more in ``angel`` changes one name of
 its syntax, and moves ``scale 2`` on by one.
@@ -12,21 +13,34 @@ its syntax, and moves ``scale 2`` on by one.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
 from ..reading import syntax, vocabulary
+from ..reading.diagnostics import Diagnostic, Diagnostics
 from ..reading.grammar import language
+from ..reading.ignore import WORD as IGNORE_WORD
+from ..reading.parse import sharpen
 from ..reading.parse_statements import FOREIGN
+from ..reading.parse_values import Reading, number_at
 from ..reading.source import Span
 from .facts import Definition, Facts, Name
 from .text import Block
 
 _NAME = re.compile(rb"[A-Za-z_][A-Za-z0-9_]*")
-_REST = re.compile(rb"[^/\r\n]*[;{}][ \t]*(?=[\r\n]|\Z)")
+# The grammar's token; where both alternatives fit, the first one is longer.
+_NUMBER = re.compile(rb"[0-9]+(?:\.[0-9]+)?[eE][+-][0-9]+[A-Za-z0-9_.]*|\.?[0-9][A-Za-z0-9_.]*")
+_BLANKS = re.compile(rb"[ \t]*")
+# Statements that end in their line, strings and a comment in it apart.
+_REST = re.compile(rb'(?:[^/"\r\n]*(?:"[^"\\\r\n]*"[^/"\r\n]*)*[;{}])?[ \t]*(?://[^\r\n]*)?(?=[\r\n]|\Z)')
+
+# Definitions with operations in them: where one goes on in a later line, the reader looks at columns.
+_WITH_COLUMNS = (syntax.Selection, syntax.Calculation, syntax.Transformation)
 
 _set_source, _set_start, _set_end = Span.source.__set__, Span.start.__set__, Span.end.__set__
 _set_name = syntax.Name.name.__set__
+_set_value, _set_text = syntax.Number.value.__set__, syntax.Number.text.__set__
 
 
 @cache
@@ -43,47 +57,55 @@ def _words() -> frozenset[str]:
     return _reserved().union((row.name for row in vocabulary.ALL.values()), vocabulary.COLOURS, vocabulary.UNSUPPORTED)
 
 
+@cache
+def _fields(kind: type) -> tuple[str, ...]:
+    """The fields of a kind of syntax node that may hold others."""
+    slots = (name for each in kind.__mro__ for name in getattr(each, "__slots__", ()))
+    return tuple(name for name in slots if name != "span")
+
+
 def _is_plain(block: Block) -> bool:
     """Whether ``block`` is one definition with no scene blocks in it."""
     return block.shape.hard and not block.data.startswith(b"#") and block.data.count(b"{") <= 1
 
 
 class Touch(NamedTuple):
-    """The number of a name among the facts' names, what it is now, and how many bytes longer."""
+    """The name or number ``leaf`` is ``text`` now; None where the edit is beside all tokens. What began or ended at or behind the
+    byte ``end`` does so ``by`` bytes later. ``index`` is the name's number among the facts' names, None where these
+    have to be found anew; ``number`` what a number is read as, and ``said`` what is wrong with it."""
 
-    index: int
+    leaf: syntax.Name | syntax.Number | None
     text: str
+    end: int
     by: int
+    index: int | None = None
+    number: syntax.Number | None = None
+    said: tuple[Diagnostic, ...] = ()
+
+    @property
+    def places(self) -> list[Span]:
+        return [self.leaf.span] if self.leaf is not None else []
 
 
 def touch_of(old: Block, new: Block) -> Touch | None:
-    """The name that makes all the difference between ``old``, which has been read, and ``new``, which has taken its place;
+    """The one token that makes all the difference between ``old``, which has been read, and ``new``, which has taken its place;
     None where there is more to it."""
     facts, edit = old.__dict__.get("facts"), new.before
     if facts is None or edit is None or edit[0] is not old or "facts" in new.__dict__:
         return None
-    if facts.syntax or facts.ghosts or facts.includes or facts.text is not old.data:
+    if facts.ghosts or facts.includes or facts.text is not old.data:
         return None
-    index = _name_at(facts, *edit[1][:2])
-    if index is None:
+    low, high, put = edit[1]
+    index = _name_at(facts, low, high)
+    leaf = facts.names[index].node if index is not None else _leaf_at(facts, low, high)
+    if any(leaf is None or each.span is not leaf.span for each in facts.syntax):
         return None
-    name, by = facts.names[index], len(new.data) - len(old.data)
-    match = _NAME.fullmatch(new.data, name.start, name.end + by)
-    if match is None or _REST.match(new.data, match.end()) is None or _names_its_rules(facts, name.start):
+    if leaf is None:
+        return _beside_tokens(facts, new, low, high, put)
+    by = len(new.data) - len(old.data)
+    if not _ends_statements(facts, new, leaf.span.end + by):
         return None
-    text, words = match[0].decode(), _reserved() if _is_plain(old) else _words()
-    return None if name.name in words or text in words else Touch(index, text, by)
-
-
-def retouch(old: Block, new: Block, touch: Touch) -> Span:
-    """Give ``new`` the facts of ``old``, which are then ``old``'s no more; the place of the name that has changed."""
-    facts = old.__dict__.pop("facts")
-    name = facts.names[touch.index]
-    move(facts, new, name.end, touch.by)
-    _rename(facts, touch)
-    facts.retouched()
-    new.__dict__.update(facts=facts, before=None)
-    return name.node.span
+    return _in_name(facts, new, leaf, index, by) if isinstance(leaf, syntax.Name) else _in_number(new, leaf, by)
 
 
 def _name_at(facts: Facts, low: int, high: int) -> int | None:
@@ -92,6 +114,88 @@ def _name_at(facts: Facts, low: int, high: int) -> int | None:
         if high <= name.end:
             return index if name.start <= low else None
     return None
+
+
+def _leaf_at(facts: Facts, low: int, high: int) -> syntax.Name | syntax.Number | None:
+    """As ``_name_at``, of the block's numbers and of the names that are the vocabulary's."""
+    waiting: list[object] = list(facts.file.definitions)
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, tuple):
+            waiting += node
+        elif isinstance(node, syntax.Node) and node.span.start <= low and high <= node.span.end:
+            if isinstance(node, syntax.Name | syntax.Number):
+                return node
+            waiting += [getattr(node, name) for name in _fields(type(node))]
+    return None
+
+
+def _ends_statements(facts: Facts, new: Block, at: int) -> bool:
+    """Whether nothing that stands from the byte ``at`` on in its line goes on in the next one, where its column matters."""
+    has_columns = any(isinstance(each, _WITH_COLUMNS) for each in facts.file.definitions)
+    return not has_columns or _REST.match(new.data, at) is not None
+
+
+def _in_name(facts: Facts, new: Block, leaf: syntax.Name, index: int | None, by: int) -> Touch | None:
+    start, end = leaf.span.start, leaf.span.end
+    match = _NAME.fullmatch(new.data, start, end + by)
+    if match is None or facts.text[start:end] != leaf.name.encode() or _names_its_rules(facts, start):
+        return None
+    text = match[0].decode()
+    if leaf.name in _reserved() or text in _reserved():
+        return None
+    if index is not None and not _is_plain(new) and (leaf.name in _words() or text in _words()):
+        index = None
+    return Touch(leaf, text, end, by, index)
+
+
+def _in_number(new: Block, leaf: syntax.Number, by: int) -> Touch | None:
+    start, end = leaf.span.start, leaf.span.end
+    match = _NUMBER.match(new.data, start)
+    if match is None or match.end() != end + by:
+        return None
+    span, diagnostics = Span(new, start, end + by), Diagnostics()
+    number = number_at(Reading(new, new.data, diagnostics), span)
+    sharpen(new, new.data, diagnostics)
+    if any(each.span is not span for each in diagnostics.items):
+        return None
+    return Touch(leaf, number.text, end, by, None, number, tuple(diagnostics.items))
+
+
+def _beside_tokens(facts: Facts, new: Block, low: int, high: int, put: int) -> Touch | None:
+    """An edit of white space that some is left of, or in a comment up to the line's end."""
+    old = facts.text
+    if IGNORE_WORD in old or IGNORE_WORD in new.data or b"/*" in new.data:
+        return None
+    line = max(old.rfind(b"\n", 0, low), old.rfind(b"\r", 0, low)) + 1
+    before, changed = old[line:low], old[low:high] + new.data[low:put]
+    if b'"' in before or not before.strip() or b"\n" in changed or b"\r" in changed:
+        return None
+    by = put - high
+    if b"//" in before:
+        return Touch(None, "", high, by)
+    blanks = _BLANKS.match(old, high).end()  # type: ignore[union-attr]
+    if changed.strip(b" \t") or (blanks == high and old[low - 1] not in b" \t"):
+        return None
+    return Touch(None, "", blanks, by) if _ends_statements(facts, new, blanks + by) else None
+
+
+def retouch(old: Block, new: Block, touch: Touch) -> None:
+    """Give ``new`` the facts of ``old``, which are then ``old``'s no more."""
+    facts = old.__dict__.pop("facts")
+    move(facts, new, touch.end, touch.by)
+    if isinstance(touch.leaf, syntax.Name):
+        _set_name(touch.leaf, touch.text)
+    elif touch.number is not None:
+        _set_value(touch.leaf, touch.number.value)
+        _set_text(touch.leaf, touch.text)
+        facts.syntax[:] = [replace(each, span=touch.leaf.span) for each in touch.said]
+    if isinstance(touch.leaf, syntax.Name) and touch.index is None:
+        facts.forget_names()
+    else:
+        _rename(facts, touch)
+    facts.retouched()
+    new.__dict__.update(facts=facts, before=None)
 
 
 def _names_its_rules(facts: Facts, start: int) -> bool:
@@ -115,13 +219,13 @@ def move(facts: Facts, block: Block, end: int, by: int) -> None:
 
 
 def _rename(facts: Facts, touch: Touch) -> None:
-    index, text, by = touch
-    names, name = facts.names, facts.names[index]
-    _set_name(name.node, text)
-    names[index] = Name(text, name.role, name.start, name.end + by, name.node)
+    """Bring the names and definitions up to date."""
+    names, index, by, end = facts.names, touch.index, touch.by, touch.end
+    if index is not None:
+        name = names[index]
+        names[index] = Name(touch.text, name.role, name.start, name.end + by, name.node)
+        if name.role == "definition":
+            facts.definitions[:] = [Definition(each.node.name.name, each.kind, each.node) for each in facts.definitions]
     if by:
-        names[index + 1 :] = [
-            Name(each.name, each.role, each.start + by, each.end + by, each.node) for each in names[index + 1 :]
-        ]
-    if name.role == "definition":
-        facts.definitions[:] = [Definition(each.node.name.name, each.kind, each.node) for each in facts.definitions]
+        first = index + 1 if index is not None else next((i for i, each in enumerate(names) if each.start >= end), len(names))
+        names[first:] = [Name(each.name, each.role, each.start + by, each.end + by, each.node) for each in names[first:]]

@@ -188,36 +188,41 @@ class Scene:
         )
 
     def _retouch(self, change: Change) -> bool:
-        """Whether all that was typed is letters of a name, which has been read then."""
+        """Whether all that was typed is in one token or beside all, which has been read then."""
         if len(change.removed) != 1 or len(change.added) != 1 or any(len(each.scenes) > 1 for each in self.documents):
             return False
         (old,), (new,) = change
         touch = touch_of(old, new)
         if touch is None:
             return False
-        facts, name = facts_of(old), facts_of(old).names[touch.index]
-        reads = name.role in ("read", "target")
+        facts, was_broken = facts_of(old), facts_of(old).is_broken
+        name = facts.names[touch.index] if touch.index is not None else None
+        is_use = name is not None and name.role in ("read", "target")
+        renames = isinstance(touch.leaf, syntax.Name) and not is_use
         # Whether all else in the block is known to be right.
         waiting = self._edited, self._dirty, self._opened
-        was_right = not any(old in table for table in waiting) and self._is_right_but_at(old, [name.node.span])
+        was_right = not was_broken and not any(old in table for table in waiting) and self._is_right_but_at(old, touch.places)
         self._note_right(old)
         self._forget(old)
-        if not reads:
+        if renames:
             self._names.forget(facts)
-        place = retouch(old, new, touch)
-        if reads:
-            self._names.learn_use(facts, name.name, touch.text)
-        else:
+        retouch(old, new, touch)
+        if renames:
             self._names.learn(facts)
+        elif is_use:
+            self._names.learn_use(facts, name.name, touch.text)
+        elif touch.leaf is not None:
+            self._names.learn_value(facts, facts.is_broken is not was_broken)
         self._learn(new)
-        if not self._is_right(new):
-            self._edited[new] = [place] if was_right else None
+        if not (was_right and touch.leaf is None) and not self._is_right(new):
+            self._edited[new] = touch.places if was_right else None
         return True
 
     def _note_right(self, block: Block) -> None:
         """Note with the facts of a block that goes if all in it is known to be right."""
         waiting = self._edited, self._dirty, self._opened
-        if not self._messages.get(block) and not any(block in table for table in waiting):
+        is_known = not any(block in table for table in waiting)
+        if is_known and not self._messages.get(block) and not facts_of(block).is_broken:
             facts_of(block).right = block.data, self._names.now
 
     def _is_right(self, block: Block) -> bool:

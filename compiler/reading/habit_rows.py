@@ -17,7 +17,8 @@ from . import vocabulary
 
 
 class Habit(NamedTuple):
-    """``where``: the contexts of :meth:`habits._Text.context`. ``mend``: what stands in its place instead, a text or
+    """``where``: the contexts of :meth:`habits._Text.context`. ``needs``: texts of which the pattern has one for sure; to look for
+    these takes less time. ``mend``: what stands in its place instead, a text or
     a function of what stands there; None if only the author can know. ``hint``: empty for "write " and the mend."""
 
     where: tuple[str, ...]
@@ -26,12 +27,19 @@ class Habit(NamedTuple):
     hint: str = ""
     mend: str | Callable[[str], str] | None = None
     code: str = "syntax"
+    needs: tuple[str, ...] = ()
 
 
 def _row(
-    where: tuple[str, ...], pattern: str, message: str, hint: str = "", mend=None, code: str = "syntax"
+    where: tuple[str, ...],
+    pattern: str,
+    message: str,
+    hint: str = "",
+    mend=None,
+    code: str = "syntax",
+    needs: tuple[str, ...] = (),
 ) -> Habit:
-    return Habit(where, re.compile(pattern, re.ASCII | re.MULTILINE), message, hint, mend, code)
+    return Habit(where, re.compile(pattern, re.ASCII | re.MULTILINE), message, hint, mend, code, needs)
 
 
 def _words(*names: str) -> str:
@@ -73,85 +81,85 @@ HABITS: tuple[Habit, ...] = (
     _row(_RULES, r"(?P<at>\b(?:elsif|elsef|elseIf|ElseIf|ELSEIF|Elseif|Elif|ELIF|Elsif)\b)[^;]*", r"'\0' is written as two words", mend="else if"),
     # L-systems
     _row(_RULES, r"(?P<at>\[\s*(?:\+(?!\+)|-(?!-)|[&^/\\|]))[^;]*", "in plsys '[' … ']' doesn't branch, and a sign doesn't turn",
-         "'+' joins, and operators stand before what they act on: F + [ trans 0 0 1; roty 25 ] F"),
+         "'+' joins, and operators stand before what they act on: F + [ trans 0 0 1; roty 25 ] F", needs=("[",)),
     _row(_RULES, rf"(?P<at>(\w+)(?:\([^()]*\))?\s*:\s*({_INNER}[<>=!]{_INNER})\s*{_ARROW})", "a condition stands before its rule",
-         mend=r"if (\3) \2 ->"),
-    _row(_RULES, rf"[{{;]\s*(?P<at>(?!if\b)([^;{{}}:\s][^;{{}}:]*?[<>=!][^;{{}}:]*?)\s*:)\s*\w+\s*{_ARROW}", "a condition stands in an `if`", mend=r"if (\2)"),
+         mend=r"if (\3) \2 ->", needs=(":",)),
+    _row(_RULES, rf"[{{;]\s*(?P<at>(?!if\b)([^;{{}}:\s][^;{{}}:]*?[<>=!][^;{{}}:]*?)\s*:)\s*\w+\s*{_ARROW}", "a condition stands in an `if`", mend=r"if (\2)", needs=(":",)),
     _row(_RULES, r"(?P<at>\b(?:switch|case|for|while|do|repeat|foreach|return)\b)\s*[\w({][^;]*", r"plsys has no '\0': a Selection chooses and repeats",
          "write if (n > 0) A -> …; else A -> …; with [ --n ] on the way back to A"),
-    _row(_RULES, r"\bif\s+(?P<at>(?!\()([^(){};:]+|[^{};:]*\([^{};:]*)\s*:)(?=\s*\w+\s*->)", "a condition stands in brackets", mend=r"(\2)"),
-    _row(_RULES, rf"\bif\s*\({_INNER}\)\s*(?P<at>:)\s*\w", "no ':' stands between a condition and its rule", mend=""),
-    _row(_RULES, r"\belse\s*(?P<at>:)\s*\w", "no ':' stands behind 'else'", mend=""),
-    _row(_RULES, r"\w\)?\s*(?P<at>::=|:=|:-|:)(?!=)", r"'\0' stands where a rule has '->'", mend="->"),
-    _row(_RULES, r"(?:\w\)?)?\s*(?P<at>-{2,}>|={2,}>|~>|<-{1,2}(?!\d)|<=(?=\s*\w+;))", r"'\0' stands where a rule has '->'", mend="->"),
+    _row(_RULES, r"\bif\s+(?P<at>(?!\()([^(){};:]+|[^{};:]*\([^{};:]*)\s*:)(?=\s*\w+\s*->)", "a condition stands in brackets", mend=r"(\2)", needs=(":",)),
+    _row(_RULES, rf"\bif\s*\({_INNER}\)\s*(?P<at>:)\s*\w", "no ':' stands between a condition and its rule", mend="", needs=(":",)),
+    _row(_RULES, r"\belse\s*(?P<at>:)\s*\w", "no ':' stands behind 'else'", mend="", needs=(":",)),
+    _row(_RULES, r"\w\)?\s*(?P<at>::=|:=|:-|:)(?!=)", r"'\0' stands where a rule has '->'", mend="->", needs=(":",)),
+    _row(_RULES, r"(?:\w\)?)?\s*(?P<at>-{2,}>|={2,}>|~>|<-{1,2}(?!\d)|<=(?=\s*\w+;))", r"'\0' stands where a rule has '->'", mend="->", needs=("-->", "==>", "~>", "<-", "<=")),
     _row(_TOP, r"^\s*(?P<at>(?:[Aa]xiom|[Ss]tart|ω)\s*[:=]?\s*(\w+))[^\r\n]*", "a scene's start symbol is placed by a block",
          mend=r"object { \2 }"),
     _row(_TOP, r"^\s*(?P<at>(\w+)(?:\([^()]*\))?\s*(?:->|=>|→)[^;{}\r\n]*;?)", "a rule stands in a Selection", r"write Selection \2 { \2 -> …; }",
          lambda text: f"Selection {re.match(r'[A-Za-z0-9_]+', text)[0]} {{ {text.rstrip(';')}; }}"),
-    _row(_RULES, r"(?P<at>(\d+(?:\.\d+)?)\s*%)\s*:", "a weight is a number without '%'", mend=r"\2"),
-    _row(_RULES, r"(?:->|\|)\s*(?P<at>-\s*)\d[\d.]*\s*:", "a weight can't be negative", "remove the sign", ""),
+    _row(_RULES, r"(?P<at>(\d+(?:\.\d+)?)\s*%)\s*:", "a weight is a number without '%'", mend=r"\2", needs=("%",)),
+    _row(_RULES, r"(?:->|\|)\s*(?P<at>-\s*)\d[\d.]*\s*:", "a weight can't be negative", "remove the sign", "", needs=(":",)),
     _row(_RULES, r"(?:->|\|)\s*(?P<at>\(\s*(\d+(?:\.\d+)?)\s*\)\s*)(?=[\w\[])", "a weight is followed by ':'", mend=r"\2: "),
     _row(_RULES, r"(?:->|\|)\s*(?P<at>(\d+(?:\.\d+)?))\s+\w[^;]*\||\|\s*(\d+(?:\.\d+)?)\s+\w", "a weight is followed by ':'",
-         "write A -> 3: x | 1: y;"),
+         "write A -> 3: x | 1: y;", needs=("|",)),
     # operators and operands of rules
     _row(_RULES, r"\b(\w+)(?:\([^()]*\))?\s*->(?:(?!\belse\b|\bif\b|->|;).)*?\b(?!\1\b)\w+\)?\s*(?P<at>->)\s*[\w(\[]", "a rule has one '->'", "'+' joins what it produces", "+"),
-    _row(_RULES, rf"(?P<at>\[\s*({_NUMBER}(?:\s+{_NUMBER}|\s*,\s*{_NUMBER}){{2}})\s*\])", "the name of an operation stands before its numbers", mend=r"[ trans \2 ]"),
-    _row(_RULES, rf"(?:{_ARROW}|[+(\]])\s*(?P<at>\[\s*{_NUMBER}(?:[\s,]+{_NUMBER})*\s*\])", "the name of an operation stands before its numbers", "write [ trans 0 0 1 ], or [ scale 0.5 ]"),
+    _row(_RULES, rf"(?P<at>\[\s*({_NUMBER}(?:\s+{_NUMBER}|\s*,\s*{_NUMBER}){{2}})\s*\])", "the name of an operation stands before its numbers", mend=r"[ trans \2 ]", needs=("[",)),
+    _row(_RULES, rf"(?:{_ARROW}|[+(\]])\s*(?P<at>\[\s*{_NUMBER}(?:[\s,]+{_NUMBER})*\s*\])", "the name of an operation stands before its numbers", "write [ trans 0 0 1 ], or [ scale 0.5 ]", needs=("[",)),
     _row(_RULES, rf"{_ARROW}\s*(?P<at>(\w+\s*[-+*/]?=(?![=>])\s*{_NUMBER}))(?=\s*[A-Za-z_(\[])", "what changes a parameter stands in square brackets", mend=r"[ \2 ]"),
     _row(_RULES, rf"(?P<at>\(\s*({_OPERATION}[^()\[\]{{}};]*)\))", "operators with arguments stand in square brackets", mend=r"[ \2 ]"),
     _row(_RULES, rf"(?:{_ARROW}|\+)?\s*(?P<at>\{{\s*((?:{_OPERATION}|--|\+\+|\w+\s*[-+*/]?=(?![=>]))[^{{}}\[\]]*?)\s*\}})\s*[\w(\[]",
-         "operators stand in square brackets", mend=r"[ \2 ]"),
+         "operators stand in square brackets", mend=r"[ \2 ]", needs=("{",)),
     _row(_RULES, rf"(?P<at>({_OPERATION}(?:[\s,]+{_NUMBER})+))(?=\s*[A-Za-z_(\[])", "operators with arguments stand in square brackets", mend=r"[ \2 ]"),
     _row(_RULES, rf"{_ARROW}\s*(?:\w+\s+)*?(?P<at>((?:--|\+\+)\s*\w+|\w+\s*(?:--|\+\+)))(?=\s*[\w(\[])", "what changes a parameter stands in square brackets",
-         mend=r"[ \2 ]"),
-    _row(_RULES, rf"{_ARROW}\s*(?P<at>(\w+\s*[-+*/]?=(?![=>])\s*[^;,]+?)\s*,)", "what changes a parameter stands in square brackets", mend=r"[ \2 ]"),
+         mend=r"[ \2 ]", needs=("--", "++")),
+    _row(_RULES, rf"{_ARROW}\s*(?P<at>(\w+\s*[-+*/]?=(?![=>])\s*[^;,]+?)\s*,)", "what changes a parameter stands in square brackets", mend=r"[ \2 ]", needs=(",",)),
     _row(_RULES, rf"(?:^|[{{;])\s*(?P<at>{_ARROW})", r"the name of a Selection stands before '\0'", "a rule looks like Name -> operators operand + …;", code="missing"),
     _row(_RULES, rf"(?P<at>({_PRIMITIVE})\s+({_NUMBER}|\"_*\"))", "arguments stand in brackets", mend=r"\2(\3)"),
-    _row(_RULES, r"(?P<at>\bmesh\s*\(\s*([\w./-]+\.\w+)\s*\))", "a file's name stands in quotation marks", mend=r'mesh("\2")'),
+    _row(_RULES, r"(?P<at>\bmesh\s*\(\s*([\w./-]+\.\w+)\s*\))", "a file's name stands in quotation marks", mend=r'mesh("\2")', needs=("mesh",)),
     _row(_RULES, rf"(?P<at>\b(?!{_OPERATION})([A-Za-z_]\w*)\s+({_NUMBER}(?:[\s,]+{_NUMBER})*))\s*(?=[;|+)]|$)", "arguments stand in brackets",
          mend=lambda text: _with_commas(re.sub(r"\s+", "(", text, count=1) + ")")),
-    _row(_RULES, rf"(?P<at>\b(\w+)\s*[\[<]\s*({_VALUE}(?:\s*,\s*{_VALUE})+|{_NUMBER})\s*[\]>])", "arguments stand in round brackets", mend=r"\2(\3)"),
+    _row(_RULES, rf"(?P<at>\b(\w+)\s*[\[<]\s*({_VALUE}(?:\s*,\s*{_VALUE})+|{_NUMBER})\s*[\]>])", "arguments stand in round brackets", mend=r"\2(\3)", needs=("[", "<")),
     _row(_RULES, r"(?P<at>(?!if\b)\b(\w+)\s+\(([^();]*[\d,*/%-][^();]*)\))", "a space stands between a symbol and its arguments", mend=r"\2(\3)"),
     _row(_RULES, rf"{_ARROW}\s*(?P<at>\+)", "nothing stands before this '+'", "remove it: '+' joins two operands", ""),
     _row(_RULES, rf"{_ARROW}(?:\s*\b\w+)*?\s*(?P<at>(\d[\w.]*)\s*\*)\s*\w", "a number doesn't multiply an operand",
-         r"write [ scale \2 ] for another size; a Selection repeats: Row -> box + [ --n; trans 1 0 0 ] Row"),
-    _row(_RULES, rf"(?!{_PRIMITIVE})\b[A-Za-z_]\w*\s*(?P<at>\*)\s*[\w(\[]", "an operator stands before its operand without a sign", mend=""),
-    _row(_RULES, r"[\w\])](?P<at>\s*,)\s*(?!else\b)[\w(\[]", "',' doesn't join what a rule produces", mend=" +"),
-    _row(_RULES, r"(?P<at>,)\s*else\b", "',' doesn't end a rule", mend=";"),
+         r"write [ scale \2 ] for another size; a Selection repeats: Row -> box + [ --n; trans 1 0 0 ] Row", needs=("*",)),
+    _row(_RULES, rf"(?!{_PRIMITIVE})\b[A-Za-z_]\w*\s*(?P<at>\*)\s*[\w(\[]", "an operator stands before its operand without a sign", mend="", needs=("*",)),
+    _row(_RULES, r"[\w\])](?P<at>\s*,)\s*(?!else\b)[\w(\[]", "',' doesn't join what a rule produces", mend=" +", needs=(",",)),
+    _row(_RULES, r"(?P<at>,)\s*else\b", "',' doesn't end a rule", mend=";", needs=(",",)),
     # how rules choose
-    _row(_RULES, r"\)\s*(?P<at>then\b)\s*", "no 'then' stands between a condition and its rule", mend=""),
+    _row(_RULES, r"\)\s*(?P<at>then\b)\s*", "no 'then' stands between a condition and its rule", mend="", needs=("then",)),
     _row(_RULES, rf"\bif\s+(?P<at>(?!\()({_INNER}\)))\s*\w+\s*{_ARROW}", "this condition lacks its '('", mend=r"(\2"),
-    _row(_RULES, rf"(?P<at>\b(\w+)\s*{_ARROW}\s*(if\s*\({_INNER}\)))[^;]*;?", "a condition stands before its rule", mend=r"\3 \2 ->"),
+    _row(_RULES, rf"(?P<at>\b(\w+)\s*{_ARROW}\s*(if\s*\({_INNER}\)))[^;]*;?", "a condition stands before its rule", mend=r"\3 \2 ->", needs=("if",)),
     _row(_RULES, rf"(?P<at>\b(\w+)\s*{_ARROW}\s*\(({_INNER}(?:[<>]|[=!]=){_INNER})\))", "a condition stands before its rule", mend=r"if (\3) \2 ->"),
     _row(_RULES, rf"(?P<at>\b(\w+)\s*{_ARROW}\s*([^;?\[\]]*?)\s*\?\s*([^;:?]*?)\s*:\s*([^;:?]*?)\s*;)", "a rule chooses by `if`",
-         mend=r"if (\3) \2 -> \4; else \2 -> \5;"),
+         mend=r"if (\3) \2 -> \4; else \2 -> \5;", needs=("?",)),
     # conditions and expressions
     _row(_PL, rf"\bif\s*\({_INNER}(?P<at>=<)", r"'\0' is no operator", mend="<="),
     _row(_PL, rf"\bif\s*\({_INNER}(?P<at>=>)", r"'\0' is no operator", mend=">="),
-    _row(_PL, r"(?P<at>===)", r"'\0' is no operator", mend="=="),
-    _row(_PL, r"(?P<at>!==|<>|~=|=/=)", r"'\0' is no operator", mend="!="),
-    _row(_PL, rf"\bif\s*\({_INNER}(?P<at>(?<!\|)\|(?!\|))", r"'\0' is no operator", mend="||"),
-    _row(_PL, rf"\bif\s*\({_INNER}(?P<at>(?<!&)&(?!&)|\b(?:and|AND)\b)", r"'\0' is no operator", mend="&&"),
-    _row(_PL, rf"\bif\s*\({_INNER}(?P<at>\b(?:or|OR)\b)", r"'\0' is no operator", mend="||"),
-    _row(_PL, rf"\bif\s*\({_INNER}(?P<at>\b(?:not|NOT)\b\s*)(?=[\w(])", r"'\0' is no operator", "write !", "!"),
-    _row(_ANY, r"(?P<at>((?<![\w.])[\w.]+|\([^()]*\))\s*(?:\*\*|\^)\s*([\w.]+|\([^()]*\)))", "a power is written with a function", mend=r"pow(\2, \3)"),
-    _row(_PL, r"[\w)]\s*(?P<at>\bmod\b)[^;]*", r"'\0' is no operator", mend="%"),
+    _row(_PL, r"(?P<at>===)", r"'\0' is no operator", mend="==", needs=("===",)),
+    _row(_PL, r"(?P<at>!==|<>|~=|=/=)", r"'\0' is no operator", mend="!=", needs=("!==", "<>", "~=", "=/=")),
+    _row(_PL, rf"\bif\s*\({_INNER}(?P<at>(?<!\|)\|(?!\|))", r"'\0' is no operator", mend="||", needs=("|",)),
+    _row(_PL, rf"\bif\s*\({_INNER}(?P<at>(?<!&)&(?!&)|\b(?:and|AND)\b)", r"'\0' is no operator", mend="&&", needs=("&", "and", "AND")),
+    _row(_PL, rf"\bif\s*\({_INNER}(?P<at>\b(?:or|OR)\b)", r"'\0' is no operator", mend="||", needs=("or", "OR")),
+    _row(_PL, rf"\bif\s*\({_INNER}(?P<at>\b(?:not|NOT)\b\s*)(?=[\w(])", r"'\0' is no operator", "write !", "!", needs=("not", "NOT")),
+    _row(_ANY, r"(?P<at>((?<![\w.])[\w.]+|\([^()]*\))\s*(?:\*\*|\^)\s*([\w.]+|\([^()]*\)))", "a power is written with a function", mend=r"pow(\2, \3)", needs=("**", "^")),
+    _row(_PL, r"[\w)]\s*(?P<at>\bmod\b)[^;]*", r"'\0' is no operator", mend="%", needs=("mod",)),
     _row(_PL, rf"(?P<at>({_FUNCTION})\s+(-?[\w.]+))\s*[;)\],+*/-]", "a function's arguments stand in brackets", mend=r"\2(\3)"),
-    _row(_PL, rf"(?P<at>({_FUNCTION})[\[{{]([^][{{}}]*)[\]}}])", "a function's arguments stand in round brackets", mend=r"\2(\3)"),
-    _row(_PL, r"(?P<at>\b(?:[Mm]ath|std|np|numpy)(?:\.|::))\w+", r"plsys has no '\0' before its functions", mend=""),
+    _row(_PL, rf"(?P<at>({_FUNCTION})[\[{{]([^][{{}}]*)[\]}}])", "a function's arguments stand in round brackets", mend=r"\2(\3)", needs=("[", "{")),
+    _row(_PL, r"(?P<at>\b(?:[Mm]ath|std|np|numpy)(?:\.|::))\w+", r"plsys has no '\0' before its functions", mend="", needs=("ath", "std", "np", "numpy")),
     _row(_PL, rf"(?P<at>\w+\(\s*{_NUMBER}(?:\s+{_NUMBER})+\s*\))", "a comma stands between two arguments", mend=_with_commas),
-    _row(_PL + _BLOCKS, r"(?P<at>,)\s*[)>]", "nothing stands after this ','", "remove it", ""),
-    _row(_PL + _BLOCKS, r"(?:[(<]|[(<][^<>();{}]*,)\s*(?P<at>,)", "nothing stands before this ','", "remove it", ""),
+    _row(_PL + _BLOCKS, r"(?P<at>,)\s*[)>]", "nothing stands after this ','", "remove it", "", needs=(",",)),
+    _row(_PL + _BLOCKS, r"(?:[(<]|[(<][^<>();{}]*,)\s*(?P<at>,)", "nothing stands before this ','", "remove it", "", needs=(",",)),
     # statements
-    _row(_STATEMENTS, r"[{;]\s*\w+\s*(?P<at>==)\s*[^;]*;", "'==' compares", "a single '=' assigns", "="),
+    _row(_STATEMENTS, r"[{;]\s*\w+\s*(?P<at>==)\s*[^;]*;", "'==' compares", "a single '=' assigns", "=", needs=("==",)),
     _row(_ANY, r"(?P<at>:=)", "':=' is no operator", mend="="),
-    _row(_STATEMENTS, rf"=\s*(?P<at>if\s*\(({_INNER})\)\s*(?:then\s+)?([^;]+?)\s+else\s+([^;]+?))\s*;", "a value chooses by '?' and ':'", mend=r"\2 ? \3 : \4"),
-    _row(_STATEMENTS, r"=\s*(?P<at>([^;=]+?)\s+if\s+([^;]+?)\s+else\s+([^;]+?))\s*;", "a value chooses by '?' and ':'", mend=r"\3 ? \2 : \4"),
-    _row(_STATEMENTS, r"(?P<at>\?)[^:;]*;", "this '?' lacks its ':'", "a choice looks like n > 0 ? 1 : 2", None, "missing"),
+    _row(_STATEMENTS, rf"=\s*(?P<at>if\s*\(({_INNER})\)\s*(?:then\s+)?([^;]+?)\s+else\s+([^;]+?))\s*;", "a value chooses by '?' and ':'", mend=r"\2 ? \3 : \4", needs=("if",)),
+    _row(_STATEMENTS, r"=\s*(?P<at>([^;=]+?)\s+if\s+([^;]+?)\s+else\s+([^;]+?))\s*;", "a value chooses by '?' and ':'", mend=r"\3 ? \2 : \4", needs=("if",)),
+    _row(_STATEMENTS, r"(?P<at>\?)[^:;]*;", "this '?' lacks its ':'", "a choice looks like n > 0 ? 1 : 2", None, "missing", needs=("?",)),
     _row(_STATEMENTS, r"(?P<at>\b(\w+)\b\s*=\s*(\w+)\s*=(?!=)\s*([^;=]+))", "a statement assigns to one name", mend=r"\3 = \4; \2 = \3"),
-    _row(_ANY, r"(?P<at>\b\d{1,3}(?:'\d{3})+)", "a number has no signs between its digits", mend=lambda text: text.replace("'", "")),
-    _row(_STATEMENTS, r"=\s*(?P<at>(-?\d+),(\d+))\s*;", "a number has a point, not a comma", mend=r"\2.\3"),
-    _row(_STATEMENTS, rf"(?P<at>,)\s*(?:\w+\s*[-+*/]?=(?!=)|{_OPERATION})", "a statement ends with ';'", mend=";"),
+    _row(_ANY, r"(?P<at>\b\d{1,3}(?:'\d{3})+)", "a number has no signs between its digits", mend=lambda text: text.replace("'", ""), needs=("'",)),
+    _row(_STATEMENTS, r"=\s*(?P<at>(-?\d+),(\d+))\s*;", "a number has a point, not a comma", mend=r"\2.\3", needs=(",",)),
+    _row(_STATEMENTS, rf"(?P<at>,)\s*(?:\w+\s*[-+*/]?=(?!=)|{_OPERATION})", "a statement ends with ';'", mend=";", needs=(",",)),
     _row(_STATEMENTS, r"\{[^{}]*=\s*(?P<at>[\[{]([^][{};]*)[\]}])", "in an expression brackets are round", mend=r"(\2)"),
     _row(_PL, rf"({_OPERATION})(?P<at>\s*[=:]\s*){_NUMBER}[^;]*", "an operation's arguments follow its name", "remove the sign", " "),
     _row(_PL, rf"({_OPERATION})(?P<at>\s*[\[{{(<]([^][{{}}()<>;]*)[\]}})>])", "an operation's arguments stand without brackets", "remove them", r" \3"),
@@ -193,7 +201,7 @@ HABITS: tuple[Habit, ...] = (
     _row(_BLOCKS, r"(?P<at><<)", "a vector starts with one '<'", mend="<"),
     _row(_BLOCKS, rf"(?P<at><(?=[^<>]*(?:;|[\w.]\s+[\w.-]))\s*{_VALUE}(?:[\s;,]+{_VALUE})+\s*>)", "a comma stands between two values of a vector",
          mend=_with_commas),
-    _row(_ANY, r"(?P<at>(?:rgb\s*)?#[0-9a-fA-F]{6})\b", "a colour is written with its components", mend=lambda text: _rgb(text[text.index("#") :])),
+    _row(_ANY, r"(?P<at>(?:rgb\s*)?#[0-9a-fA-F]{6})\b", "a colour is written with its components", mend=lambda text: _rgb(text[text.index("#") :]), needs=("#",)),
     # comments
     _row(_TOP, r"^\s*(?P<at>--+|%+|;+|<!--|\(\*|'|!|REM\b|rem\b|#(?=\s))\s*\w[^\r\n]*", "comments start with // or stand between /* and */", "write //", "//"),
 )  # fmt: skip

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 
 from .codes import CODES
 from .diagnostics import Diagnostic, Diagnostics
@@ -104,17 +105,24 @@ def _mask(match: re.Match[bytes]) -> bytes:
     return re.sub(rb"[^\r\n]", b" ", match[0])
 
 
+@cache
+def _habits_in(context: str) -> tuple[Habit, ...]:
+    return tuple(habit for habit in HABITS if context in habit.where)
+
+
 def _habit_at(text: _Text, item: Diagnostic) -> tuple[Diagnostic, tuple[int, int]] | None:
     """The message for the habit that an item comes from, and from where to where it explains all that is wrong."""
     offset = item.span.start
     context, (low, high) = text.context(offset), text.window(offset)
-    if context in ("rules", "statements") and (found := _FLOOR.search(text.data[low:high].decode("latin-1"))):
+    is_code, line = context in ("rules", "statements"), text.masked[low:high]
+    if is_code and b"//" in text.data and (found := _FLOOR.search(text.data[low:high].decode("latin-1"))):
         span = Span(text.source, low + found.start(1), low + found.end(1))
         mend = f"floor({found[2]}/{found[3]})"
         message = Diagnostic("syntax", "error", "'//' starts a comment", span, f"write {mend}", mend=mend)
         return message, (low, high)
-    for habit in HABITS:
-        if context not in habit.where:
+    occurs = line.__contains__
+    for habit in _habits_in(context):
+        if habit.needs and not any(map(occurs, habit.needs)):
             continue
         for match in habit.pattern.finditer(text.masked, low, high):
             if match.start() <= offset <= match.end():

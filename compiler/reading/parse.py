@@ -46,13 +46,18 @@ def convert(
     reader = _FileReader(Reading(source, text, diagnostics, spans))
     reader.file(tree)
     mistakes.extras(reader.reading, tree)
+    sharpen(source, text, diagnostics)
+    check_ignores(source, text, diagnostics)
+    diagnostics.items[:] = diagnostics.sorted()
+    return syntax.File(reader.reading.between(0, len(source.data)), tuple(reader.definitions))
+
+
+def sharpen(source: Source, text: bytes, diagnostics: Diagnostics) -> None:
+    """Let messages about habits from other languages take the place of vague ones."""
     if diagnostics.items:
         from . import habits  # many patterns, for texts with mistakes only
 
         habits.sharpen(source, text, diagnostics)
-    check_ignores(source, text, diagnostics)
-    diagnostics.items[:] = diagnostics.sorted()
-    return syntax.File(reader.reading.between(0, len(source.data)), tuple(reader.definitions))
 
 
 class _FileReader:

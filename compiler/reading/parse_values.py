@@ -211,19 +211,22 @@ def _name(reading: Reading, node: Node, depth: int) -> syntax.Name | None:
 
 
 def number(reading: Reading, node: Node, depth: int = 0) -> syntax.Number | None:
-    if node.is_missing:
-        return None
-    text = reading.text(node)
+    return None if node.is_missing else number_at(reading, reading.span(node))
+
+
+def number_at(reading: Reading, span: Span) -> syntax.Number:
+    """The number that the token at ``span`` is; what is wrong with it is said of this very span."""
+    text = reading.data[span.start : span.end].decode(errors="replace")
     if not _NUMBER.fullmatch(text):
-        return _malformed_number(reading, node, text)
+        return _malformed_number(reading, span, text)
     value = float(text)
     if math.isinf(value):
-        reading.complain(node, f"the number {text} is too large", "the largest is 1.7976931348623157e308")
+        reading.complain(span, f"the number {text} is too large", "the largest is 1.7976931348623157e308")
         value = 0.0
-    return syntax.Number(reading.span(node), value, text)
+    return syntax.Number(span, value, text)
 
 
-def _malformed_number(reading: Reading, node: Node, text: str) -> syntax.Number:
+def _malformed_number(reading: Reading, span: Span, text: str) -> syntax.Number:
     """Explain ``.5``, ``5.``, ``2x`` or ``1.5.2``, and read on with the number at its start."""
     read = text
     for pattern, message, hint, mend in _MALFORMED:
@@ -231,11 +234,11 @@ def _malformed_number(reading: Reading, node: Node, text: str) -> syntax.Number:
             read = mend(match) if mend else text
             parts = match[0], *match.groups()
             hint = hint.format(*parts) or f"write {read}"
-            reading.complain(node, message.format(*parts), hint, mend=read if mend else None)
+            reading.complain(span, message.format(*parts), hint, mend=read if mend else None)
             break
     text = read
     start = _NUMBER.match(text)
-    return syntax.Number(reading.span(node), float(start[0]) if start else 0.0, text)
+    return syntax.Number(span, float(start[0]) if start else 0.0, text)
 
 
 def string(reading: Reading, node: Node | None, depth: int = 0) -> syntax.String | None:

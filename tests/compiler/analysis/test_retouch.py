@@ -1,8 +1,9 @@
-"""What is kept of a block when letters are typed into its names is what a reading of the new text gives."""
+"""What is kept of a block when one token is edited, or white space or a comment, is what a reading of the new text gives."""
 
 from __future__ import annotations
 
 import random
+import re
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,10 @@ SCENES = sorted((ROOT / "scenes").glob("*.plsys"))
 
 SCENE = """\
 #declare Height = 2;
-#declare Bark = texture { pigment { color rgb <Height/4, 0.3, 0.1> } }
+#declare Bark = texture { pigment { color rgb <Height/4, 0.3, 0.1> }
+                          finish { phong 1e-1  // shiny
+                                   ambient .2 } }
+Parameter age = 1.5 [0 to 20] "Age  in 2 years";
 Selection Tree(n)
 {
     C_init Tree;
@@ -36,7 +40,9 @@ Transformation T_down { roty angle  // ;
 object { Tree(3) texture { Bark } translate <Height, 0, 0> }
 object { Bush }
 """
-LETTERS = ["x", "for", "i", "f", "1", "_", "rgb", " ", "-", "", "", "", "cone", "Bark", "é"]
+LETTERS = ["x", "for", "i", "f", "1", "_", "rgb", " ", "-", "", "", "", "cone", "Bark", "é", ".", "e", "  ", "\t", "/", "0", '"']
+# Names, numbers, comments and white space, at and in which most of the edits are.
+TOKENS = re.compile(rb"[A-Za-z_]\w*|[.\d][\w.]*|//[^\n]*|[ \t]+")
 
 
 def shown(value: object, block: Block) -> object:
@@ -81,10 +87,10 @@ def check(project: Project, document: Document) -> None:
 
 
 def places(rng: random.Random, document: Document, count: int) -> list[int]:
-    """Places at and in names mostly, the last one first."""
-    names = [base + rng.randint(each.start, each.end)
-             for block, base in zip(document.text.blocks, document.text.starts) for each in facts_of(block).names]  # fmt: skip
-    return sorted({rng.choice(names) if rng.random() < 0.8 else rng.randrange(len(document.text)) for _ in range(count)}, reverse=True)
+    """Places at and in tokens mostly, the last one first."""
+    tokens = [match.span() for match in TOKENS.finditer(document.text.data)]
+    several = (rng.randint(*rng.choice(tokens)) if rng.random() < 0.8 else rng.randrange(len(document.text)) for _ in range(count))
+    return sorted(set(several), reverse=True)
 
 
 def type_at_many_places(rng: random.Random, document: Document, project: Project) -> int:
@@ -127,6 +133,24 @@ def test_letters_at_many_places(seed):
         ("Calculation C { |n = 1; }\n", "2"),
         ("Calculation C { n| = 1; }\n", " 2"),
         ('#include "|a.plsys"\n#declare B = c;\n', "b"),
+        ("#declare B = tex|ture { }\n", "x"),  # it is an object now
+        ("Tex|ture B { pigment { color rgb 1 } }\n", "x"),
+        ("Calculation C { n = 1| -2; }\n", "e"),
+        ("Calculation C { n = 1|-2; }\n", "e"),  # one number now
+        ("Calculation C { n = |1; }\n", "x"),
+        ("Calculation C { n = 1|; }\n", "x"),
+        ("Calculation C { n = 2|; }\nSelection A { A -> C box; }\n", "_"),  # what C assigns isn't known now
+        ("#declare B = 1|;\n#declare C = sqrt(1 - B);\n", "0"),
+        ("Selection A { if (2|) A -> box; }\n", "x"),
+        ("Transformation T |{ roty\n                  angle; }\n", " "),
+        ("Transformation T { scale 2;  | roty\n                  angle; }\n", " "),  # `angle` stands no deeper now
+        ("Transformation T { scale -| 2; }\n", " "),
+        ("Transformation T { scale |-2 ; }\n", " "),
+        ('Parameter a = 1 "a| b";\n', " "),
+        ("Calculation C { n = 2; // plsys-ignore: un|used\n}\n", "x"),
+        ("Calculation C { n = 2; /| a\n n = 2; }\n", "/"),
+        ("Calculation C { n = 2; //| a\n n = 2; }\n", "/"),
+        ("Calculation C { n = 2; /* // */| n = 3; }\n", " "),
     ],
 )
 def test_letters_with_a_meaning(text, typed):
@@ -154,6 +178,33 @@ def test_a_letter_in_a_name_keeps_the_rest():
     project.work()
     assert facts_of(document.text.block_at(at)[0]) is facts
     check(project, document)
+
+
+@pytest.mark.parametrize(
+    "text, typed",
+    [
+        ("Transformation T { scale 0.|5; }\n", "2"),
+        ("Transformation T { scale 0.|5; }\n", "x"),
+        ("#declare B = texture { pi|gment { color rgb 1 } }\n", "x"),
+        ("camera {\n    location <0, 1|, 2>\n    angle 45\n}\n", "0"),
+        ("camera {\n    location <0, 1, 2> |\n    angle 45\n}\n", " "),
+        ("Transformation T { scale 2; |  // a comment\n}\n", "  "),
+        ("Transformation T { scale 2;  // a |comment\n}\n", "{ /"),
+        ('Selection A { A -> [ scale 1.|5 ] mesh("a.obj"); }\n', "2"),
+    ],
+)
+def test_what_is_in_or_beside_tokens_keeps_the_rest(text, typed):
+    project = Project()
+    at = text.index("|")
+    document = project.open(None, text.replace("|", "").encode(), name="x")
+    before = told(project, document)
+    facts = facts_of(document.text.blocks[0])
+    for edit in ((at, at, typed.encode()), (at, at + len(typed), b"")):
+        project.edit(document, *edit)
+        project.work()
+        assert facts_of(document.text.blocks[0]) is facts
+        check(project, document)
+    assert told(project, document) == before
 
 
 def library_of_two_scenes(folder):
