@@ -80,14 +80,11 @@ class Facts:
             self._tree = syntax_tree(self.text)
         return self._tree
 
-    def retouched(self) -> None:
-        """The text has changed, and with it all else but the tree."""
+    def retouched(self, *others: str) -> None:
+        """The text has changed, and with it all else but the tree and what follows from names; ``others`` are properties that
+        did not follow."""
         self.text, self._tree = self.file.span.source.data, None
-        self.__dict__.pop("is_broken", None)
-
-    def forget_names(self) -> None:
-        """A word has changed that may have been no name of the scene's, or none any more."""
-        for each in ("names", "definitions", "assigned"):
+        for each in ("is_broken", *others):
             self.__dict__.pop(each, None)
 
     @lazy_property
@@ -117,6 +114,11 @@ class Facts:
         return sorted(
             {(name.start, name.end): name for name in found if name.name}.values(), key=lambda n: n.start
         )
+
+    @lazy_property
+    def words(self) -> frozenset[str]:
+        """The names that occur."""
+        return frozenset([name.name for name in self.names])
 
     @lazy_property
     def is_broken(self) -> bool:

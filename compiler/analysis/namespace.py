@@ -12,7 +12,7 @@ Example::
 
 from __future__ import annotations
 
-from typing import Callable, Iterator
+from typing import Callable, Iterable, Iterator
 
 from ..reading import syntax, vocabulary
 from ..reading.model import Definition as ModelDefinition
@@ -61,8 +61,8 @@ class Namespace:
         for name in facts.assigned:
             self._drop(self.writers, name.name, facts)
             self._touched[name.name] = None
-        for name in facts.names:
-            self._drop(self.users, name.name, facts)
+        for name in facts.words:
+            self._drop(self.users, name, facts)
 
     @staticmethod
     def _drop(table: dict[str, dict], name: str, facts: Facts) -> None:
@@ -81,14 +81,21 @@ class Namespace:
         for name in facts.assigned:
             self.writers.setdefault(name.name, {}).setdefault(facts, []).append(name)
             self._touched[name.name] = None
-        for name in facts.names:
-            self.users.setdefault(name.name, {})[facts] = None
+        self._learn_users(facts, facts.words)
 
-    def learn_use(self, facts: Facts, before: str, after: str) -> None:
-        """Where ``facts`` read one name they read another now; ``before`` they may read elsewhere, too."""
-        if all(name.name != before for name in facts.names):
-            self._drop(self.users, before, facts)
-        self.users.setdefault(after, {})[facts] = None
+    def _learn_users(self, facts: Facts, words: Iterable[str]) -> None:
+        users = self.users
+        for name in words:
+            if (several := users.get(name)) is not None:
+                several[facts] = None
+            else:
+                users[name] = {facts: None}
+
+    def learn_uses(self, facts: Facts, before: frozenset[str]) -> None:
+        """``facts`` have other words than ``before``, but still define and assign the same names."""
+        for name in before - facts.words:
+            self._drop(self.users, name, facts)
+        self._learn_users(facts, facts.words - before)
         self.learn_value(facts)
 
     def learn_value(self, facts: Facts, is_other: bool = False) -> None:
@@ -188,7 +195,7 @@ class Namespace:
     def are_as(self, facts: Facts, moment: int) -> bool:
         """Whether all names in ``facts`` mean what they did when ``now`` was ``moment``."""
         changed = self._changed
-        return all(changed.get(name.name, 0) <= moment for name in facts.names)
+        return all(changed.get(name, 0) <= moment for name in facts.words)
 
     def nearest(self, name: str, kinds: tuple[str, ...] | None) -> str:
         """As Names.nearest of the compiler."""

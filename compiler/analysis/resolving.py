@@ -13,7 +13,7 @@ from typing import Callable
 
 from ..reading import syntax
 from ..reading.diagnostics import Diagnostic, Diagnostics
-from ..reading.model import Empty, Operand
+from ..reading.model import Constant, Empty, Operand, Variants
 from ..reading.resolve import Resolver
 from ..reading.resolve_names import Entry
 from ..reading.source import Source, Span
@@ -22,6 +22,11 @@ from .text import Block
 
 # Given a wrong name and the kinds that are wanted (None: any): a hint that names what is most like it.
 Nearest = Callable[[str, tuple[str, ...] | None], str]
+
+
+# What stands for what is left out: nobody looks at what a block comes to.
+_ALWAYS = Constant(1.0)
+_NOTHING = Variants(_ALWAYS)
 
 
 class Router(Diagnostics):
@@ -45,8 +50,8 @@ class Router(Diagnostics):
 class BlockResolver(Resolver):
     """Resolves in the namespace ``entries``. It is made anew for each block, so that what it remembers of one doesn't
     outlive it; values of constants stay in the entries. ``nearest`` finds names that are like a wrong one faster than
-    by comparing all of them. Where ``places`` are given, rules and terms with none of them in it are known to be right
-    and left out."""
+    by comparing all of them. Where ``places`` are given, rules, guards, terms and statements with none of them in it are known to be
+    right and left out."""
 
     def __init__(
         self, block: Source, diagnostics: Diagnostics, entries: dict[str, Entry], nearest: Nearest | None = None,
@@ -63,23 +68,30 @@ class BlockResolver(Resolver):
             self.names.nearest = self._hint  # type: ignore[method-assign]
 
     def _leave_out(self, places: list[Span]) -> None:
-        production, term = self.rules._production, self.terms.term
+        production, test = self.rules._production, self.rules._test
+        term, statement = self.terms.term, self.operators._statement
 
         def is_right(node: syntax.Node) -> bool:
-            return not any(node.span.start <= place.start and place.end <= node.span.end for place in places)
+            start, end = node.span.start, node.span.end
+            for place in places:
+                if start <= place.start and place.end <= end:
+                    return False
+            return True
 
         def whole(node: syntax.Term, owner: str) -> Operand:
             # The first problem of a term hides others, so that all of it is looked at.
-            self.terms.term = term  # type: ignore[method-assign]
+            self.terms.term, self.operators._statement = term, statement  # type: ignore[method-assign]
             try:
                 return term(node, owner)
             finally:
-                self.terms.term = touched  # type: ignore[method-assign]
+                leave_out()
 
-        def touched(node: syntax.Term, owner: str) -> Operand:
-            return Empty(node.span) if is_right(node) else whole(node, owner)
+        def leave_out() -> None:
+            self.terms.term = lambda node, owner: Empty(node.span) if is_right(node) else whole(node, owner)  # type: ignore[method-assign]
+            self.operators._statement = lambda node: _NOTHING if is_right(node) else statement(node)  # type: ignore[method-assign]
 
-        self.terms.term = touched  # type: ignore[method-assign]
+        leave_out()
+        self.rules._test = lambda node: _ALWAYS if is_right(node) else test(node)  # type: ignore[method-assign]
         self.rules._production = (  # type: ignore[method-assign]
             lambda node, *rest: Empty(node.span) if is_right(node) else production(node, *rest)
         )

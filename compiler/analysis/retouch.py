@@ -72,7 +72,8 @@ def _is_plain(block: Block) -> bool:
 class Touch(NamedTuple):
     """The name or number ``leaf`` is ``text`` now; None where the edit is beside all tokens. What began or ended at or behind the
     byte ``end`` does so ``by`` bytes later. ``index`` is the name's number among the facts' names, None where these
-    have to be found anew; ``number`` what a number is read as, and ``said`` what is wrong with it."""
+    have to be found anew; ``number`` what a number is read as, and ``said`` what is wrong with it.
+    ``renames``: other names may be defined or assigned now, or of another kind."""
 
     leaf: syntax.Name | syntax.Number | None
     text: str
@@ -81,6 +82,7 @@ class Touch(NamedTuple):
     index: int | None = None
     number: syntax.Number | None = None
     said: tuple[Diagnostic, ...] = ()
+    renames: bool = False
 
     @property
     def places(self) -> list[Span]:
@@ -144,9 +146,17 @@ def _in_name(facts: Facts, new: Block, leaf: syntax.Name, index: int | None, by:
     text = match[0].decode()
     if leaf.name in _reserved() or text in _reserved():
         return None
+    renames = index is not None and facts.names[index].role in ("definition", "write")
+    renames = renames or any(each is leaf for each in _heads(facts))
     if index is not None and not _is_plain(new) and (leaf.name in _words() or text in _words()):
         index = None
-    return Touch(leaf, text, end, by, index)
+    return Touch(leaf, text, end, by, index, renames=renames)
+
+
+def _heads(facts: Facts) -> list[syntax.Name]:
+    """The names of blocks that are declared, which make the kind of the definition."""
+    declared = (each.items[0] for each in facts.file.definitions if isinstance(each, syntax.Declare))
+    return [each.name for each in declared if isinstance(each, syntax.Block)]
 
 
 def _in_number(new: Block, leaf: syntax.Number, by: int) -> Touch | None:
@@ -190,11 +200,13 @@ def retouch(old: Block, new: Block, touch: Touch) -> None:
         _set_value(touch.leaf, touch.number.value)
         _set_text(touch.leaf, touch.text)
         facts.syntax[:] = [replace(each, span=touch.leaf.span) for each in touch.said]
-    if isinstance(touch.leaf, syntax.Name) and touch.index is None:
-        facts.forget_names()
+    is_name = isinstance(touch.leaf, syntax.Name)
+    if is_name and touch.index is None:
+        # Which words of a scene block are the scene's depends on the others.
+        facts.retouched("words", "names", "definitions", "assigned")
     else:
         _rename(facts, touch)
-    facts.retouched()
+        facts.retouched(*(("words",) if is_name else ()))
     new.__dict__.update(facts=facts, before=None)
 
 

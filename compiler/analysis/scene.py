@@ -195,22 +195,19 @@ class Scene:
         touch = touch_of(old, new)
         if touch is None:
             return False
-        facts, was_broken = facts_of(old), facts_of(old).is_broken
-        name = facts.names[touch.index] if touch.index is not None else None
-        is_use = name is not None and name.role in ("read", "target")
-        renames = isinstance(touch.leaf, syntax.Name) and not is_use
+        facts, was_broken, words = facts_of(old), facts_of(old).is_broken, facts_of(old).words
         # Whether all else in the block is known to be right.
         waiting = self._edited, self._dirty, self._opened
         was_right = not was_broken and not any(old in table for table in waiting) and self._is_right_but_at(old, touch.places)
         self._note_right(old)
         self._forget(old)
-        if renames:
+        if touch.renames:
             self._names.forget(facts)
         retouch(old, new, touch)
-        if renames:
+        if touch.renames:
             self._names.learn(facts)
-        elif is_use:
-            self._names.learn_use(facts, name.name, touch.text)
+        elif isinstance(touch.leaf, syntax.Name):
+            self._names.learn_uses(facts, words)
         elif touch.leaf is not None:
             self._names.learn_value(facts, facts.is_broken is not was_broken)
         self._learn(new)

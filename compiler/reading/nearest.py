@@ -93,7 +93,7 @@ def _hint(name: str, names: list[str]) -> str:
     same = next((other for other in names if other.casefold() == name.casefold()), None)
     if same is not None:
         return f"did you mean '{same}'?"
-    best = _most_like(name, names)
+    best = _a_letter_off(name, names) or _most_like(name, names)
     return f"did you mean '{best}'?" if best else ""
 
 

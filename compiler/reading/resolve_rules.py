@@ -15,6 +15,7 @@ from .model import (
     Choose,
     Constant,
     Empty,
+    Expression,
     Operand,
     Produce,
     Production,
@@ -92,14 +93,15 @@ class Rules:
         """``rest`` is what applies when no guard of ``node`` does; ``number`` is its first rule's."""
         if isinstance(node, syntax.Rule):
             return self._rule(node, owner, number)
-        test = self.names.reporting(
-            lambda: self.expressions.number(node.test, RULES), Constant(1.0, node.test.span)
-        )
+        test = self._test(node.test)
         then = self._production(node.then, owner, rest, number)
         otherwise = rest
         if node.otherwise is not None:
             otherwise = self._production(node.otherwise, owner, rest, number + rule_count(node.then))
         return Branch(test, then, otherwise, node.span)
+
+    def _test(self, node: syntax.Expression) -> Expression:
+        return self.names.reporting(lambda: self.expressions.number(node, RULES), Constant(1.0, node.span))
 
     def _rule(self, node: syntax.Rule, owner: syntax.Selection, number: int) -> Production:
         self._check_target(node, owner)
