@@ -19,6 +19,7 @@ from typing import Callable, Iterable, Iterator
 
 from .deadline import Deadline
 from .document import Document, Message
+from .folders import SUFFIX
 from .scene import Scene
 from .text import Change
 
@@ -82,8 +83,16 @@ class Project:
         document = self.documents.get(_key(path))
         if document is not None:
             self.reload(document)
-        else:
+        elif path.suffix == SUFFIX:
             self._look_for_includes()
+        else:
+            self._mesh_changed(path.name.encode())
+
+    def _mesh_changed(self, name: bytes) -> None:
+        """What uses a mesh file is read and checked as if it had been edited."""
+        for document in list(self.documents.values()):
+            using = [block for block in document.text.blocks if b"mesh" in block.data and name in block.data]
+            self._changed(document, [document.text.renew(block) for block in using])
 
     def edit(self, document: Document, start: int, end: int, data: bytes) -> None:
         self.edits(document, ((start, end, data),))

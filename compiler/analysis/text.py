@@ -188,6 +188,12 @@ class Text:
         end = max(start, min(end, len(self)))
         return self._plain(start, end, data) or self._put(start, end, data)
 
+    def renew(self, block: Block) -> Change:
+        """Put an equal block in the place of ``block``: what is known of it holds no longer."""
+        change = self._swap(self.order[block], block.data)
+        self._loose = [change.added[0] if each is block else each for each in self._loose]
+        return change
+
     def _plain(self, start: int, end: int, data: bytes) -> Change | None:
         """An edit that leaves the block round it as it is to its neighbours, and so needs no look at them. None for one of
         which that isn't clear."""

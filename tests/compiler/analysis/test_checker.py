@@ -94,3 +94,15 @@ def test_what_is_told_in_pieces_is_what_is_told_at_once(monkeypatch):
 
     assert checked(telling.in_pieces) == checked(lambda answer: [answer])
     assert max(counts) > 3
+
+
+def test_a_mesh_file_that_comes_and_goes(checker, results, tmp_path):
+    mesh, project = tmp_path / "leaf.obj", Project()
+    text = b'camera { }\nlight_source { <0, 0, 9> color rgb 1 }\nSelection A { A -> mesh("leaf.obj"); }\nobject { A }\n'
+    document = project.open(tmp_path / "scene.plsys", text)
+    scene = project.scene_of(document)
+    assert codes(checker, results, scene, document) == ["file"]
+    for change, expected in ((lambda: mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), []), (mesh.unlink, ["file"])):
+        change()
+        project.file_changed(mesh)
+        assert codes(checker, results, scene, document) == expected

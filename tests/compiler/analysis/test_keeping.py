@@ -53,6 +53,7 @@ EXCHANGES = [
     ("object { Forest }", "object { Forest texture { Bark0 } }"), ("light_source", "// light_source"), ("1 }\n#dec", "1 }\nglobal_settings { seed 4 }\n#dec"),
     ("<0, -14, 5>", "<0, 0, 0.5>"), ("T_up Tree1 +", "Forest +"), ("Parameter order", "Parameter older"), ("{ --n", "{ --n0; --n"),
     ("cylinder", "mesh(\"no.obj\")"), ("else Tree2 ->", "Tree2 ->"), ("T_up { ", "T_up { // plain\n"), ("\nSelection Twig0", "\nSelection Tree0"),
+    ("<Redness, 0.3, 0.1>", "<128, 64, 0>"), ("n1/10, 0>", "200, 0>"),
 ]  # fmt: skip
 
 # Most of these leave all names and the number of rules as they are, and all can be undone.
@@ -65,6 +66,7 @@ WITHIN = [
     ("scale w1", "scale w1; spare = 3"), ("Tree1 + Tree2", "Tree1 + Tree1"), ("else Tree2 ->", "else if (n2 < 9) Tree2 ->"), ("n0 > 0", "n1 > 0"),
     ("(n1 + all)", "(all + n1, 2)"), ("C_init1 Tree1;", "C_init1 C_init1 Tree1;"), ("T_turn2 box", "T_turn2 box + box"), ("sphere +", "sphere"),
     ("rotz n2", "rotz"), ("Calculation C_less1", "Transformation C_less1"), ("Redness = 0.5", "Redness = 0"), ("sky <0, 0, 1>", "sky <0, 1, 1>"),
+    ("n1/10, 0>", "200, 0>"), ("n0/10, 0>", "99, 0>"), ("<Redness, 0.3, 0.1>", "<128, 64, 0>"),
 ]  # fmt: skip
 
 
@@ -161,9 +163,10 @@ def test_definitions_are_exchanged_as_if_all_were_resolved(seed):
             editing.expect_a_fresh_start_s_messages()
 
 
-def test_an_edit_within_a_definition_leaves_the_namespace_alone(monkeypatch):
+@pytest.mark.parametrize("colour", ["<Twice, n2/10, 0>", "<128, 200, 0>"], ids=["nothing to say", "a message elsewhere"])
+def test_an_edit_within_a_definition_leaves_the_namespace_alone(colour, monkeypatch):
     project, work = Project(), Work()
-    document = project.open(None, SCENE.encode(), name="x")
+    document = project.open(None, SCENE.replace("<Twice, n2/10, 0>", colour).encode(), name="x")
     scene = project.scene_of(document)
     snapshot = Snapshot.of(scene, 0)
     work.run(snapshot.request, lambda answer: None)
