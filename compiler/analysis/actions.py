@@ -10,9 +10,14 @@ from dataclasses import dataclass
 from typing import Iterator, NamedTuple
 
 from ..reading import syntax, vocabulary
+from ..reading.resolve_objects import SIGNED_NAME
 from .document import Document, Message, Place
 from .facts import Facts, facts_of
 from .scene import Scene
+
+
+# So far from a place is looked for the name that it is in.
+NAME_REACH = 100
 
 
 class TextEdit(NamedTuple):
@@ -86,6 +91,14 @@ class Spot:
         if not before.strip() or before[-1:] in (b" ", b"\t"):
             return self.edit(start, end + blanks, "")
         return self.edit(start, end, "")
+
+    def signed_name(self) -> TextEdit | None:
+        """Of ``tree-age`` round the spot the edit that makes ``tree_age`` of it."""
+        data, at = self.document.text.block_at(self.start)[0].data.decode("latin-1"), self.start - self.base
+        for found in SIGNED_NAME.finditer(data, max(0, at - NAME_REACH), at + NAME_REACH):
+            if found.start() <= at < found.end():
+                return self.edit(self.base + found.start(), self.base + found.end(), found[0].replace("-", "_"))
+        return None
 
     def after_definition(self) -> int:
         """Where a new definition can stand: behind the one round the spot, at the end of its line."""

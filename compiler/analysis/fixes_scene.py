@@ -130,6 +130,21 @@ def own_target(spot: Spot, match: re.Match, message: Message) -> Found:
     return f"Write {match[1]}", [spot.replace(match[1])]
 
 
+def joined_name(spot: Spot, match: re.Match, message: Message) -> Found:
+    edit = spot.signed_name()
+    return (f"Write '{edit.text}'", [edit]) if edit is not None and edit.text in spot.scene.entries else None
+
+
+def declare_time(spot: Spot, match: re.Match, message: Message) -> Found:
+    """An input of the scene in the place of POV-Ray's clock."""
+    entry = spot.scene.entries.get("time")
+    if entry is not None and entry.kind == "input":
+        return "Write 'time'", [spot.replace("time")]
+    name, at = fresh_name(spot.scene, "time"), spot.after_definition()
+    declared = spot.edit(at, at, f'\nParameter {name} = 0 [0 to 1] "Time";')
+    return f"Declare the Parameter '{name}'", [spot.replace(name), declared]
+
+
 # --- the scene as a whole
 
 
@@ -274,6 +289,8 @@ def property_first(spot: Spot, match: re.Match, message: Message) -> Found:
 
 
 def remove_property(spot: Spot, match: re.Match, message: Message) -> Found:
+    if isinstance(spot.definition, syntax.Selection):
+        return None  # what stands in a rule is no property
     part = _property(spot)
     node = spot.document.node_at(spot.start)[0]
     if part is not None and node.parent is not None and node.parent.type not in ("block", "block_body"):
@@ -307,6 +324,7 @@ def _starts_property(node) -> bool:
 
 SCENE_FIXES = {
     "unknown-name": (
+        (r"^unknown name", joined_name),
         (r"^unknown|is (?:not|un)known|nothing defines", define("Selection", "{0} -> ;")),
         (r"^unknown|is (?:not|un)known|nothing defines", define("Transformation", "trans 0 0 1;")),
         (r"^unknown|is (?:not|un)known|nothing defines", define("Calculation", "n = 1;")),
@@ -324,6 +342,7 @@ SCENE_FIXES = {
     "wrong-order": ((r"after look_at", property_first),),
     "unsupported": (
         (r"assumed_gamma must be", gamma_one),
+        (r"^POV-Ray's 'clock'", declare_time),
         (r"^POV-Ray's '", remove_property),
     ),
     "include": ((r"stock|colors|\.inc", remove_definition),),

@@ -53,7 +53,8 @@ def suggestion(spot: Spot, match: re.Match, message: Message) -> Found:
     """ "did you mean 'Tree'?": replace the last word of the spot that isn't it."""
     if spot.start == spot.end or "\n" in spot.text:
         return None
-    return f"Replace by '{match[1]}'", [spot.replace(match[1])]
+    joined = spot.signed_name()
+    return f"Replace by '{match[1]}'", [joined if joined is not None and joined.text == match[1] else spot.replace(match[1])]
 
 
 def in_brackets(spot: Spot, match: re.Match, message: Message) -> Found:
@@ -236,6 +237,7 @@ TEXT_FIXES = {
     "wrong-arguments": ((_WRITE, write_hint),),
     "unsupported": (
         (r"^#local isn't", replace("#declare")),
+        (r"^POV-Ray's 'merge'", replace("union")),
         (r"^#(?:version|undef|debug|warning|error|statistics|render) isn't", remove_directive),
     ),
 }

@@ -56,12 +56,18 @@ _PRIMITIVE = _words(*vocabulary.PRIMITIVES)
 _TYPE = r"\b(?:int|integer|float|double|real|number|bool|auto|var|let|const|local)\b"
 _KEYWORD = r"\b(?:Selection|Calculation|Transformation|Parameter|Texture)"
 _ARROW = r"(?:->|=>)"
+_SIGNED = r"\b[A-Za-z_]\w*(?:-[A-Za-z_]\w*)+\b"
+_HAS_SIGN = r"the name '\0' has a sign in it"
 
 _TOP, _HEAD, _RULES, _STATEMENTS, _PARAMETER, _BLOCKS = (
     (name,) for name in ("top", "head", "rules", "statements", "parameter", "block")
 )  # fmt: skip
 _PL = _RULES + _STATEMENTS
 _ANY = _TOP + _HEAD + _PL + _PARAMETER + _BLOCKS
+
+
+def _without_signs(text: str) -> str:
+    return text.replace("-", "_")
 
 
 def _with_commas(text: str) -> str:
@@ -102,6 +108,7 @@ HABITS: tuple[Habit, ...] = (
     _row(_RULES, r"(?:->|\|)\s*(?P<at>(\d+(?:\.\d+)?))\s+\w[^;]*\||\|\s*(\d+(?:\.\d+)?)\s+\w", "a weight is followed by ':'",
          "write A -> 3: x | 1: y;", needs=("|",)),
     # operators and operands of rules
+    _row(_RULES, rf"(?P<at>\b(?=[\w-]*\w\w){_SIGNED})", _HAS_SIGN, mend=_without_signs),
     _row(_RULES, r"\b(\w+)(?:\([^()]*\))?\s*->(?:(?!\belse\b|\bif\b|->|;).)*?\b(?!\1\b)\w+\)?\s*(?P<at>->)\s*[\w(\[]", "a rule has one '->'", "'+' joins what it produces", "+"),
     _row(_RULES, rf"(?P<at>\[\s*({_NUMBER}(?:\s+{_NUMBER}|\s*,\s*{_NUMBER}){{2}})\s*\])", "the name of an operation stands before its numbers", mend=r"[ trans \2 ]", needs=("[",)),
     _row(_RULES, rf"(?:{_ARROW}|[+(\]])\s*(?P<at>\[\s*{_NUMBER}(?:[\s,]+{_NUMBER})*\s*\])", "the name of an operation stands before its numbers", "write [ trans 0 0 1 ], or [ scale 0.5 ]", needs=("[",)),
@@ -151,6 +158,7 @@ HABITS: tuple[Habit, ...] = (
     _row(_PL + _BLOCKS, r"(?P<at>,)\s*[)>]", "nothing stands after this ','", "remove it", "", needs=(",",)),
     _row(_PL + _BLOCKS, r"(?:[(<]|[(<][^<>();{}]*,)\s*(?P<at>,)", "nothing stands before this ','", "remove it", "", needs=(",",)),
     # statements
+    _row(_STATEMENTS, rf"[{{;]\s*(?P<at>{_SIGNED})\s*[-+*/]?=", _HAS_SIGN, mend=_without_signs),
     _row(_STATEMENTS, r"[{;]\s*\w+\s*(?P<at>==)\s*[^;]*;", "'==' compares", "a single '=' assigns", "=", needs=("==",)),
     _row(_ANY, r"(?P<at>:=)", "':=' is no operator", mend="="),
     _row(_STATEMENTS, rf"=\s*(?P<at>if\s*\(({_INNER})\)\s*(?:then\s+)?([^;]+?)\s+else\s+([^;]+?))\s*;", "a value chooses by '?' and ':'", mend=r"\2 ? \3 : \4", needs=("if",)),
@@ -177,7 +185,8 @@ HABITS: tuple[Habit, ...] = (
     _row(_HEAD, rf"{_KEYWORD}\s+\w+\s*(?P<at>=?\s*texture|=|:|->)\s*\{{", "nothing stands between a definition's name and its '{'", "remove it", ""),
     _row(_HEAD + _TOP, r"\bTexture\s+\w+\s*(?P<at>=?\s*texture)\s*\{", "nothing stands between a Texture's name and its '{'", "remove it", ""),
     _row(_HEAD + _PARAMETER, rf"{_KEYWORD}\s+(?P<at>\d\w*)", r"the name '\0' begins with a digit", "a name begins with a letter: Tree1"),
-    _row(_HEAD + _PARAMETER, rf"{_KEYWORD}\s+(?P<at>(\w+)-(\w+))", r"the name '\0' has a sign in it", mend=r"\2_\3"),
+    _row(_HEAD + _PARAMETER, rf"{_KEYWORD}\s+(?P<at>{_SIGNED})", _HAS_SIGN, mend=_without_signs),
+    _row(_TOP, rf"^\s*#declare\s+(?P<at>{_SIGNED})\s*=", _HAS_SIGN, mend=_without_signs),
     _row(_HEAD + _PARAMETER, rf"{_KEYWORD}\s+(?P<at>if|else|Selection|Calculation|Transformation|Parameter)\b", r"'\0' is a word of plsys and can't be a name",
          "choose another, such as my_name"),
     _row(_HEAD, rf"{_KEYWORD}\s+\w+\s*\([^(){{}}]*?(?P<at>\s*=\s*[^,(){{}}]+)", "a symbol's parameters have no default values",

@@ -9,6 +9,7 @@ Example: ``sphere { <0,0,0>, 1 texture { T } translate <1,0,0> }`` is
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import Callable
 
@@ -25,6 +26,9 @@ from .resolve_textures import TRANSFORMATIONS, Look, Textures
 from .source import Span
 from .vocabulary import BLOCKS as BLOCK_ROWS
 from .vocabulary import MODIFIERS
+
+# What other languages have as a name, and here is a difference.
+SIGNED_NAME = re.compile(r"[A-Za-z_]\w*(?:-[A-Za-z_]\w*)+", re.ASCII)
 
 # Declared objects in declared objects double quickly; a million parts is more than a text should hold.
 MAX_PARTS = 1_000_000
@@ -128,6 +132,8 @@ class Objects:
             return self._nested(item)
         name = item.name if isinstance(item, syntax.Call) else item
         if not isinstance(name, syntax.Name):
+            if SIGNED_NAME.fullmatch(item.span.text):
+                raise _with_a_sign(item)
             items.at -= 1
             raise items.misfit(())
         if name.name == "mesh" and isinstance(item, syntax.Call):
@@ -265,6 +271,11 @@ class Objects:
             placed.put_texture(
                 Look(look.pigment, self.textures.finish(block, BLOCKS, look.finish)), move=False
             )
+
+
+def _with_a_sign(item: syntax.Item) -> Problem:
+    mend = item.span.text.replace("-", "_")
+    return Problem("wrong-value", item.span, f"the name '{item.span.text}' has a sign in it", f"write {mend}", mend=mend)
 
 
 def split(operand: Operand) -> list[tuple[str, Operand]]:

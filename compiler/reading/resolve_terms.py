@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Callable
 
 from . import syntax, vocabulary
+from .blocks_in_rules import block_in_rule, union_in_rule
 from .diagnostics import Note
 from .meanings import Record
 from .model import (
@@ -86,7 +87,7 @@ class Terms:
                 "join with '+'",
             )
         if isinstance(item, syntax.Block):
-            raise Problem("wrong-kind", item.span, *_block_in_rule(item))
+            raise block_in_rule(item, self.expressions)
         name = item.name if isinstance(item, syntax.Call) else item
         assert isinstance(name, syntax.Name)
         if name.name in vocabulary.PRIMITIVES or self._is(name, "selection"):
@@ -120,7 +121,7 @@ class Terms:
                 "write an operand after them",
             )
         if isinstance(item, syntax.Block):
-            raise Problem("wrong-kind", item.span, *_block_in_rule(item))
+            raise block_in_rule(item, self.expressions)
         name = item.name if isinstance(item, syntax.Call) else item
         assert isinstance(name, syntax.Name)
         arguments = item.arguments if isinstance(item, syntax.Call) else ()
@@ -128,6 +129,8 @@ class Terms:
             return MeshLeaf(self.mesh(item), item.span)
         if name.name in vocabulary.PRIMITIVES:
             return self._primitive(name, item.span, arguments, scope)
+        if name.name == "union" and isinstance(item, syntax.Call):
+            raise union_in_rule(item)
         if name.name == "plane":
             hint = "planes are endless: write plane { … } as a scene block, or use square"
             raise Problem("wrong-kind", name.span, "a plane can't be produced by rules", hint)
@@ -254,18 +257,3 @@ def _ends(node: syntax.Selection) -> tuple[syntax.Name, ...]:
     lasts = [term.items[-1] for term in terms_of(node) if term is not node.entry and term.items]
     targets = [last.name if isinstance(last, syntax.Call) else last for last in lasts]
     return tuple(target for target in targets if isinstance(target, syntax.Name))
-
-
-def _block_in_rule(item: syntax.Block) -> tuple[str, str]:
-    name = item.name.name
-    if name in ("texture", "pigment", "finish"):
-        return (
-            f"a {name} block can't stand in a rule",
-            "name it: Texture Leaf { pigment { … } } and write Leaf",
-        )
-    if name in vocabulary.PRIMITIVES:
-        return (
-            f"the scene block '{name}' can't stand in a rule",
-            f"write [ trans … ] {name}: rules have unit shapes",
-        )
-    return f"the block '{name}' can't stand in a rule", "scene blocks stand outside of Selections"

@@ -919,7 +919,6 @@ UNSUPPORTED: dict[str, str] = {'difference': 'plsys has no solid geometry: only 
                'primitives',
  'intersection': 'plsys has no solid geometry: only `union` joins shapes; build the visible surface from '
                  'primitives',
- 'merge': 'plsys has no solid geometry: only `union` joins shapes; build the visible surface from primitives',
  'inverse': 'plsys has no solid geometry: only `union` joins shapes; build the visible surface from '
             'primitives',
  'clipped_by': 'plsys has no solid geometry: only `union` joins shapes; build the visible surface from '
@@ -933,6 +932,7 @@ UNSUPPORTED: dict[str, str] = {'difference': 'plsys has no solid geometry: only 
                 'primitives',
  'inside_vector': 'plsys has no solid geometry: only `union` joins shapes; build the visible surface from '
                   'primitives',
+ 'merge': 'write union { ... }: of shapes that nothing is seen through it is the same',
  'isosurface': 'the shapes are sphere, box, cylinder, cone, plane, torus, triangle, disc and mesh; bring '
                'others as an OBJ or PLY file: object { mesh("file.obj") }',
  'parametric': 'the shapes are sphere, box, cylinder, cone, plane, torus, triangle, disc and mesh; bring '
@@ -1183,7 +1183,6 @@ UNSUPPORTED: dict[str, str] = {'difference': 'plsys has no solid geometry: only 
  'u': 'write numbers; a `Parameter` is what changes between pictures',
  'v': 'write numbers; a `Parameter` is what changes between pictures',
  't': 'write numbers; a `Parameter` is what changes between pictures',
- 'clock': 'write numbers; a `Parameter` is what changes between pictures',
  'clock_delta': 'write numbers; a `Parameter` is what changes between pictures',
  'clock_on': 'write numbers; a `Parameter` is what changes between pictures',
  'frame_number': 'write numbers; a `Parameter` is what changes between pictures',
@@ -1197,6 +1196,7 @@ UNSUPPORTED: dict[str, str] = {'difference': 'plsys has no solid geometry: only 
  'no': 'write numbers; a `Parameter` is what changes between pictures',
  'true': 'write numbers; a `Parameter` is what changes between pictures',
  'false': 'write numbers; a `Parameter` is what changes between pictures',
+ 'clock': 'declare it: Parameter time = 0 [0 to 1]; and set it for each picture: -D time=0.5',
  'vlength': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan asin '
             'acos atan2 rand hash; `%` is the remainder',
  'vnormalize': 'the functions are abs sign floor ceil round min max clamp mix pow exp log sqrt sin cos tan '
