@@ -184,10 +184,9 @@ static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries,
 #ifdef __x86_64__
     const int isa = tracer->scene->isa;
     const double scale = ((const pl_fronts *)tracer->scene->structure)->list->scale;
-    /* The packets' kernels look at all. */
+    /* The packets' kernel looks at all. */
     const bool packet = count >= PL_LEAST_LANES && is_alike(rays, rays + 1, scale) && is_alike(rays, rays + count - 1, scale);
-    if (isa == PL_ISA_AVX512) kernel = packet ? pl_bvh_packet_avx512 : pl_bvh_stream_avx512;
-    else if (isa != PL_ISA_SCALAR) kernel = packet ? pl_bvh_packet_avx2 : pl_bvh_stream_avx2;
+    if (isa != PL_ISA_SCALAR) kernel = packet ? pl_bvh_packet_avx2 : isa == PL_ISA_AVX512 ? pl_bvh_stream_avx512 : pl_bvh_stream_avx2;
 #endif
     return kernel(tracer, rays, queries, count);
 }

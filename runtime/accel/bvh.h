@@ -80,7 +80,7 @@ extern pl_bvh_kernel pl_bvh_trace_scalar, pl_bvh_trace_avx2, pl_bvh_trace_avx512
 /* Of several rays, whether or not they go the same way. */
 typedef bool pl_bvh_many_kernel(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
 extern pl_bvh_many_kernel pl_bvh_stream_scalar, pl_bvh_stream_avx2, pl_bvh_stream_avx512;
-extern pl_bvh_many_kernel pl_bvh_packet_avx2, pl_bvh_packet_avx512;
+extern pl_bvh_many_kernel pl_bvh_packet_avx2;
 /* Rays go well together as a packet where all directions lie about the first's, by this share of its size (sums of axes), and so
  * do the origins, by this share of half the size of what is traced. */
 #define PL_ALIKE 0.125

@@ -154,7 +154,6 @@ static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries,
 {
 #ifdef __x86_64__
     const pl_terrains *terrains = tracer->scene->terrains;
-    pl_terrain_packet *kernel = tracer->scene->isa == PL_ISA_AVX512 ? pl_terrain_packet_avx512 : pl_terrain_packet_avx2;
     pl_ray mapped[PL_LANES];
     if (tracer->scene->isa == PL_ISA_SCALAR || count < PL_LEAST_LANES) return trace_one_by_one(tracer, rays, queries, count);
     for (unsigned k = 0; k < count; k++)
@@ -163,7 +162,7 @@ static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries,
         const pl_terrain *terrain = &terrains->list[i];
         if (queries->shadow && terrain->place.no_shadow) continue;
         for (unsigned k = 0; k < count; k++) map_to_place(&terrain->place, &rays[k], mapped[k].origin, mapped[k].direction);
-        if (!kernel(tracer, terrain, mapped, queries, count)) return false;
+        if (!pl_terrain_packet_avx2(tracer, terrain, mapped, queries, count)) return false;
     }
     return !terrains->fronts || pl_accel_bvh.trace_many(tracer, rays, queries, count);
 #else

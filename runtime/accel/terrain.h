@@ -225,7 +225,7 @@ extern pl_terrain_kernel pl_terrain_trace_scalar, pl_terrain_trace_avx2, pl_terr
 /* The foremost hits of up to PL_LANES rays, which are in the terrain's frame. */
 typedef bool pl_terrain_packet(pl_tracer *tracer, const pl_terrain *terrain, const pl_ray *rays, pl_query *queries,
                                unsigned count);
-extern pl_terrain_packet pl_terrain_packet_avx2, pl_terrain_packet_avx512;
+extern pl_terrain_packet pl_terrain_packet_avx2;
 
 /* Evaluates a triangle normatively and offers it; o, d: the ray in the terrain's frame. false: an error. */
 bool pl_terrain_candidate(pl_tracer *tracer, const pl_terrain *terrain, uint64_t tile, uint32_t leaf, const double o[3],
