@@ -7,67 +7,12 @@
 
 #include "elementary.h"
 #include "error.h"
+#include "shading.h"
 #include "texture.h"
 #include "vector.h"
 
-/* POV-Ray's tolerances, in scene units (section 7). */
-#define POVRAY_LEAST 1e-4
-#define POVRAY_SHADOW 1e-3
-#define POVRAY_FARTHEST 1e7
-
 /* A light this flat above the surface doesn't count (section 2). */
 #define LEAST_COSINE 1e-10
-
-/* A ray that waits to be traced. */
-typedef struct pl_bounce {
-    double origin[3], direction[3], t_min;
-    double share[3]; /* of the sample's colour that the ray's colour counts for */
-    double width;    /* of the pixel's footprint at the origin; it goes on growing by the view's spread */
-    double weight;   /* POV-Ray's measure of it: the product of largest channels */
-    uint32_t level;
-} pl_bounce;
-
-/* One hit while it is shaded. */
-typedef struct pl_spotted {
-    const pl_bounce *ray;
-    bool found; /* false: the ray met nothing, and the rest is unspecified */
-    double depth;               /* t on the ray */
-    double point[3], normal[3]; /* turned against the ray */
-    double flat[3];             /* the surface's own normal, to either side */
-    double width;               /* of the pixel's footprint here */
-    const pl_hit *hit;
-    bool convex;                /* as of pl_surface */
-    double epsilon;             /* rounding error of the point, in our own tolerances */
-    pl_pigment pigment;
-    pl_finish finish;
-    double total[3]; /* its own light, as far as it is added up */
-} pl_spotted;
-
-/* One light on one of several hits, while shadows are traced. */
-typedef struct pl_shine {
-    pl_spotted *at;
-    double towards[3], distance;
-    double color[3]; /* that arrives … */
-    double share[3]; /* … and what the surface's own colour shows of it */
-} pl_shine;
-
-struct pl_shader {
-    const pl_view *view;
-    pl_tracer *tracer;
-    pl_bounce *waiting;
-    size_t count, capacity;
-    uint32_t sample_rays;
-    pl_ray_counts rays;
-    /* Rays that are traced together, and what they meet: those of the eye, of one bounce, or towards one light. */
-    pl_ray traced[PL_TRACE_MANY];
-    pl_ray eye_rays[PL_TRACE_MANY]; /* as eyes: all but their directions is the same for all samples */
-    bool blocked[PL_TRACE_MANY];
-    /* Samples that are shaded together, and those of their hits that a light shines on. */
-    pl_bounce eyes[PL_SHADE_MANY];
-    pl_hit hits[PL_SHADE_MANY];
-    pl_spotted spotted[PL_SHADE_MANY];
-    pl_shine shines[PL_SHADE_MANY], *sorted[PL_SHADE_MANY];
-};
 
 bool pl_view_create(pl_view *view, const pl_scene *scene, pl_error *error)
 {
@@ -172,137 +117,6 @@ void pl_shader_count(const pl_shader *shader, pl_scene *scene)
     pl_scene_count(scene, shader->tracer, &shader->rays);
 }
 
-/* --- shadows (section 4) --- */
-
-typedef struct pl_shadow {
-    pl_shader *shader;
-    const pl_ray *ray;
-    double last; /* t of the surface crossed last */
-    double *color;
-    pl_error *error;
-    bool failed;
-} pl_shadow;
-
-/* Sets where a ray in a direction leaves the surface: off it by its rounding error, in our own tolerances. */
-static void leave(const pl_shader *shader, const pl_spotted *at, const double direction[3], double origin[3])
-{
-    const double off = shader->view->povray_epsilon ? 0.0 : copysign(at->epsilon, pl_dot(direction, at->flat));
-    for (int axis = 0; axis < 3; axis++) origin[axis] = at->point[axis] + off * at->flat[axis];
-}
-
-/* What a surface on the way to the light lets through. */
-static bool passes(pl_shader *shader, const pl_ray *ray, const pl_hit *hit, double through[3], pl_error *error)
-{
-    pl_surface surface;
-    pl_pigment pigment;
-    if (!pl_trace_surface(shader->tracer, ray, hit, &surface, error) ||
-        !pl_texture_pigment(surface.texture, surface.entries, surface.pattern_point, &pigment, error))
-        return false;
-    pl_pigment_through(&pigment, through);
-    return true;
-}
-
-/* One surface between a point and the light. */
-static bool cross(void *context, const pl_hit *hit)
-{
-    pl_shadow *shadow = context;
-    double through[3];
-    if (shadow->shader->view->povray_epsilon) {
-        if (!(hit->t - shadow->last > POVRAY_SHADOW)) return true;
-        shadow->last = hit->t;
-    }
-    shadow->failed = !passes(shadow->shader, shadow->ray, hit, through, shadow->error);
-    if (shadow->failed) return false;
-    for (int c = 0; c < 3; c++) shadow->color[c] *= through[c];
-    if (!pl_is_dark(shadow->color)) return true;
-    memset(shadow->color, 0, 3 * sizeof *shadow->color);
-    return false;
-}
-
-/* Filters the colour by all surfaces along the ray, in order. Where the nearest one, which is known, is opaque, the
- * others don't matter and needn't be found. */
-static bool filter_light(pl_shader *shader, const pl_ray *ray, const pl_hit *nearest, double color[3], pl_error *error)
-{
-    double through[3];
-    if (nearest->t == INFINITY) return true;
-    if (!passes(shader, ray, nearest, through, error)) return false;
-    if (through[0] == 0.0 && through[1] == 0.0 && through[2] == 0.0) {
-        memset(color, 0, 3 * sizeof *color);
-        return true;
-    }
-    pl_shadow state = {.shader = shader, .ray = ray, .color = color, .error = error};
-    return pl_trace_all(shader->tracer, ray, cross, &state, error) && !state.failed;
-}
-
-/* The ray from a hit to the light; false: there is nothing in between. */
-static bool set_shadow_ray(const pl_shader *shader, const pl_shine *shine, pl_ray *ray)
-{
-    const pl_view *view = shader->view;
-    const pl_spotted *at = shine->at;
-    leave(shader, at, shine->towards, ray->origin);
-    memcpy(ray->direction, shine->towards, sizeof ray->direction);
-    ray->t_min = view->povray_epsilon ? POVRAY_SHADOW : 0.0;
-    ray->t_max = view->povray_epsilon ? fmin(shine->distance - POVRAY_SHADOW, POVRAY_FARTHEST) : shine->distance - at->epsilon;
-    ray->shadow = true;
-    ray->leaves = at->convex && !view->povray_epsilon && pl_dot(ray->direction, at->flat) > 0.0 ? at->hit : NULL;
-    ray->width = at->width;
-    ray->spread = view->spread;
-    return ray->t_min < ray->t_max;
-}
-
-/* Makes the colours that arrive what is left of them behind everything on the first `count` rays to the light. */
-static bool shadow_light(pl_shader *shader, pl_shine *const *shines, unsigned count, pl_error *error)
-{
-    shader->rays.shadow += count;
-    if (shader->view->all_opaque) {
-        if (pl_trace_any_many(shader->tracer, shader->traced, count, shader->blocked, error) < count) return false;
-        for (unsigned i = 0; i < count; i++)
-            if (shader->blocked[i]) memset(shines[i]->color, 0, sizeof shines[i]->color);
-        return true;
-    }
-    if (pl_trace_nearest_many(shader->tracer, shader->traced, count, shader->hits, error) < count) return false;
-    for (unsigned i = 0; i < count; i++)
-        if (!filter_light(shader, &shader->traced[i], &shader->hits[i], shines[i]->color, error)) return false;
-    return true;
-}
-
-/* Puts shines about into the order of their distance from the eye: into drawers. Hits of a tile that are equally far away
- * lie side by side, so their rays to a light meet the same things; those of neighbouring pixels may be far apart. */
-static void sort_by_depth(pl_shine *shines, unsigned count, pl_shine **sorted)
-{
-    enum { DRAWERS = 64 };
-    uint8_t drawers[PL_SHADE_MANY];
-    unsigned begin[DRAWERS + 1] = {0};
-    double nearest = INFINITY, farthest = 0.0;
-    for (unsigned i = 0; i < count; i++) {
-        nearest = fmin(shines[i].at->depth, nearest);
-        farthest = fmax(shines[i].at->depth, farthest);
-    }
-    const double scale = farthest > nearest ? (DRAWERS - 1) / (farthest - nearest) : 0.0;
-    for (unsigned i = 0; i < count; i++) {
-        const double place = (shines[i].at->depth - nearest) * scale;
-        drawers[i] = place < DRAWERS - 1 ? (uint8_t)place : DRAWERS - 1;
-        begin[drawers[i] + 1]++;
-    }
-    for (int i = 0; i < DRAWERS; i++) begin[i + 1] += begin[i];
-    for (unsigned i = 0; i < count; i++) sorted[begin[drawers[i]]++] = &shines[i];
-}
-
-/* What of the first `count` shines arrives. */
-static bool cast_shadows(pl_shader *shader, unsigned count, pl_error *error)
-{
-    pl_shine **next = shader->sorted, *const *end = next + count;
-    sort_by_depth(shader->shines, count, next);
-    while (next < end) {
-        pl_shine *shadowed[PL_TRACE_MANY];
-        unsigned rays = 0;
-        for (; next < end && rays < PL_TRACE_MANY; next++)
-            if (set_shadow_ray(shader, *next, &shader->traced[rays])) shadowed[rays++] = *next;
-        if (rays && !shadow_light(shader, shadowed, rays, error)) return false;
-    }
-    return true;
-}
-
 /* --- light on a surface (section 2) --- */
 
 /* Of the angle between the light and the mirrored ray; 0: no highlight. */
@@ -374,7 +188,7 @@ static bool add_light(pl_shader *shader, const pl_light *light, pl_spotted *spot
         shine->at = &spotted[i];
         if (spotted[i].found && shines_on(light, shine)) shining++;
     }
-    if (!light->shadowless && !cast_shadows(shader, shining, error)) return false;
+    if (!light->shadowless && !pl_cast_shadows(shader, shining, error)) return false;
     for (unsigned i = 0; i < shining; i++) add_shine(light, &shader->shines[i]);
     return true;
 }
@@ -425,7 +239,7 @@ static bool follow(pl_shader *shader, const pl_spotted *at, const double factor[
         next.level++;
         shader->rays.reflection++;
     }
-    leave(shader, at, next.direction, next.origin);
+    pl_leave(shader->view, at, next.direction, next.origin);
     return push(shader, &next, error);
 }
 

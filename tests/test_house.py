@@ -20,10 +20,10 @@ LAYERS = [
     ["derive.h", "state.h", "reach.h", "coverage.h", "cut.h", "interval.h", "hull.h", "class.h"],
     ["scene.h"],
     ["accel/*.h"],
-    ["texture.h", "light.h", "camera.h", "shade.h", "quantise.h"],
+    ["texture.h", "light.h", "camera.h", "shade.h", "shading.h", "quantise.h"],
     ["render.h", "antialias.h"],
 ]
-SHADING = ["texture.c", "light.c", "camera.c", "shade.c", "render.c", "antialias.c"]
+SHADING = ["texture.c", "light.c", "camera.c", "shade.c", "shadow.c", "render.c", "antialias.c"]
 
 
 def layer_of(path: Path) -> int | None:
