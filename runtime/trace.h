@@ -1,6 +1,6 @@
 /* trace.h - from a ray to a hit, and from a hit to the surface that shading needs.
  *
- * shade.c sees the scene only through this file. A tracer is one thread's working memory (stacks, counters) over an
+ * Shading sees the scene only through this file. A tracer is one thread's working memory (stacks, counters) over an
  * immutable scene. Rays are in world space; directions need not be unit length. A hit is *normative* (see
  * DESIGN in ARCHITECTURE.md): its t was evaluated level by level along the derivation path, so it is the same
  * for every accelerator and thread. */
