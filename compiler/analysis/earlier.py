@@ -49,6 +49,10 @@ class Earlier:
             del self._facts[oldest]
             self._bytes -= len(data)
 
+    def __contains__(self, new: Block) -> bool:
+        """Whether there is what ``take`` gives."""
+        return (new.path, new.data) in self._facts
+
     def take(self, new: Block) -> bool:
         """Give ``new`` what was read from an earlier block with its text; whether there is such."""
         if "facts" in new.__dict__ or (facts := self._pop(new)) is None:

@@ -98,6 +98,8 @@ def touch_of(old: Block, new: Block) -> Touch | None:
     if facts.ghosts or facts.includes or facts.text is not old.data:
         return None
     low, high, put = edit[1]
+    if any(low < each.span.start or each.span.end < high for each in facts.syntax):
+        return None
     index = _name_at(facts, low, high)
     leaf = facts.names[index].node if index is not None else _leaf_at(facts, low, high)
     if any(leaf is None or each.span is not leaf.span for each in facts.syntax):

@@ -192,7 +192,7 @@ class Scene:
         if len(change.removed) != 1 or len(change.added) != 1 or any(len(each.scenes) > 1 for each in self.documents):
             return False
         (old,), (new,) = change
-        touch = touch_of(old, new)
+        touch = touch_of(old, new) if new not in self._earlier else None
         if touch is None:
             return False
         facts, was_broken, words = facts_of(old), facts_of(old).is_broken, facts_of(old).words
