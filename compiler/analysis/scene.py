@@ -197,8 +197,7 @@ class Scene:
             return False
         facts, was_broken, words = facts_of(old), facts_of(old).is_broken, facts_of(old).words
         # Whether all else in the block is known to be right.
-        waiting = self._edited, self._dirty, self._opened
-        was_right = not was_broken and not any(old in table for table in waiting) and self._is_right_but_at(old, touch.places)
+        was_right = not was_broken and not self._is_waiting(old) and self._is_right_but_at(old, touch.places)
         self._note_right(old)
         self._forget(old)
         if touch.renames:
@@ -217,10 +216,12 @@ class Scene:
 
     def _note_right(self, block: Block) -> None:
         """Note with the facts of a block that goes if all in it is known to be right."""
-        waiting = self._edited, self._dirty, self._opened
-        is_known = not any(block in table for table in waiting)
-        if is_known and not self._messages.get(block) and not facts_of(block).is_broken:
+        if not (self._is_waiting(block) or self._messages.get(block) or facts_of(block).is_broken):
             facts_of(block).right = block.data, self._names.now
+
+    def _is_waiting(self, block: Block) -> bool:
+        """Whether a block is to be resolved."""
+        return block in self._edited or block in self._dirty or block in self._opened
 
     def _is_right(self, block: Block) -> bool:
         """Whether an earlier block with the same text was right, and all names in it mean the same."""

@@ -31,6 +31,12 @@ _LINE_END = re.compile(rb"\r\n|\n|\r")
 _PLAIN = re.compile(rb"[\w ().,:<>=+|-]*")
 _AMID_PLAIN = re.compile(rb"[\w ().,:<>=+|{};-][\w ().,:<>=+|-]*[\w ().,:<>=+|{};\r\n-]")
 
+# Where a definition is complete, and nothing but comments (about the next one, mostly) follows; or the text's end.
+_CODE_END = re.compile(rb"[};](?=(?:\s|//[^\r\n]*(?=[\r\n]|\Z)|/\*(?:[^*]|\*(?!/))*\*/)*\Z)|.\Z", re.DOTALL)
+
+# A definition that lacks its name.
+_NAMELESS = re.compile(rb"[A-Za-z_]\w*\s*\{")
+
 # A line on which another piece might begin: see split.py.
 _HEAD_LINE = re.compile(rb"[\r\n][A-Za-z_#]")
 
@@ -203,12 +209,15 @@ class Text:
         if shape.depth or shape.comment or not low or not _PLAIN.fullmatch(data) or not _AMID_PLAIN.fullmatch(old, low - 1, high + 1):
             return None
         # Whether the next block starts where it does is seen at the end of this one.
-        ends = len(old.rstrip())
-        if high >= ends or old[ends - 1] not in b"};":
+        has_comments = b"//" in old or b"/*" in old
+        end = _CODE_END.search(old).start() if has_comments else len(old.rstrip()) - 1  # type: ignore[union-attr]
+        if high > end or old[end] not in b"};":
             return None
         if not shape.hard and not 0 <= old.find(b"{") < low:
             return None  # it might be no block any more
         new = old[:low] + data + old[high:]
+        if (_NAMELESS.match(new) is None) is not (_NAMELESS.match(old) is None):
+            return None  # a name in the line before makes `name Selection {` of it, which starts there
         # Plain bytes are no tokens of the split but in the words that begin a line.
         if not block.has_head_lines:
             if is_hard(new) != shape.hard:
@@ -236,6 +245,8 @@ class Text:
         # each side is split again, and further ones where a brace or comment is open.
         first, last = self.index_at(start), self.index_at(end)
         low, high = self._loose_before(max(0, first - 1)), min(len(self.blocks), last + 2)
+        while low > 0 and not self.blocks[low].shape.hard and b"{" not in self.blocks[low].data:
+            low -= 1  # that it starts there is because of the brace in the next one
         while True:
             base = self._starts[low]
             old = b"".join([block.data for block in self.blocks[low:high]])

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import random
 import re
 
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from plsys.compiler.analysis.text import Text
+from stress import rounds
 
 PIECES = [
     "\n", "\r\n", "\r", "\ufeff", "\0", "𝔸", "é", " ", "{", "}", "/*", "*/", "// x", '"', ";", "#declare A = ", "1",
     "\nSelection A\n{ A -> box; }\n", "\ncamera {\n angle 45 }\n", "\nsphere {\n", "box", "\nunion {\nbox { }\n}\n",
     "\nTexture T {", "\f", "\u2028", "Calculation C {}", "y", "Selection", " a b ", "-",
+    "\nobject { A  scale 2 }\n\n// Plant 2; a }\n// b\n", "Parameter a = 2 // b; c\n",
 ]  # fmt: skip
 
 texts = st.lists(st.sampled_from(PIECES), max_size=12).map("".join)
@@ -27,6 +31,28 @@ def characters(data: bytes) -> list[int]:
     return [i for i in range(len(data) + 1) if i == len(data) or data[i] & 0xC0 != 0x80]
 
 
+LINES = [
+    "object { A  scale 2 }\n", "// Plant 2; a }\n", "// b\n", "\n", "Selection A\n{ A -> box; }\n", "Calculation C { a = 1; }\n", "/* x; */\n",
+    "Parameter a = 2 // b; c\n", "#declare B = 2\n", "camera { angle 45 }\n", "union {\nbox { }\n}\n", "// }\n", "sphere\n", '"a;//b"\n',
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(rounds(200, 20_000)))
+def test_small_edits_of_lines(seed):
+    """Where definitions end is seen in spite of comments and strings, and where one begins in spite of its neighbours."""
+    rng = random.Random(seed)
+    data = "".join(rng.choices(LINES, k=rng.randint(2, 7))).encode()
+    text = Text("x", None, data)
+    for _ in range(6):
+        first = rng.randrange(len(data) + 1)
+        last = min(len(data), first + rng.choice((0, 0, 0, 1, 2)))
+        new = rng.choice((b"x", b" ", b"1", b"", b"box", b"Selection", b"-"))
+        text.replace(first, last, new)
+        data = data[:first] + new + data[last:]
+        fresh = Text("x", None, data)
+        assert [(block.data, block.shape) for block in text.blocks] == [(block.data, block.shape) for block in fresh.blocks]
+
+
 @settings(max_examples=300, deadline=None)
 @given(texts, edits)
 @example("\nSelection A\n{ A -> box; }\n#declare A = ", [(0.0, 0.0, "\nCalculation C {}/*"), (0.0, 0.0, "/*"), (1.0, 0.0, "*/")])
@@ -34,6 +60,7 @@ def characters(data: bytes) -> list[int]:
     "\nSelection A\n{ A -> box; }\n*/",
     [(0.0, 0.0, "\nSelection A\n{ A -> box; }\n"), (0.0, 0.0, 2 * "\nSelection A\n{ A -> box; }\n" + "/*")],
 )
+@example("camera { }\nsphere\nCalculation C { a = 1; }\n", [(0.69, 0.05, ""), (0.72, 0.0, "-")])  # `sphere Calculation {` for a while
 def test_edits_and_lines_as_of_a_string(start, changes):
     data = start.encode()
     text = Text("x", None, data)
