@@ -48,22 +48,6 @@ static inline bool note(crowd *c, unsigned i, enum progress progress)
     return progress != FAILED;
 }
 
-/* The primitives of a round: first it is seen which may be met. false: an error. */
-static inline bool try_primitives(pl_tracer *tracer, crowd *c, bool any)
-{
-    unsigned candidates = 0, certain = 0;
-    EACH(i, c->primitives) {
-        const enum kernel_verdict verdict = judge(tracer, &c->walks[i], next_of(&c->walks[i]), any);
-        candidates |= (unsigned)(verdict != MISS) << i;
-        certain |= (unsigned)(verdict == CERTAIN) << i;
-    }
-    EACH(i, candidates) {
-        walk *k = &c->walks[i];
-        if (!note(c, i, settle_primitive(tracer, k, next_of(k), any && certain >> i & 1))) return false;
-    }
-    return true;
-}
-
 /* One step of each ray. false: an error. */
 static inline bool make_round(pl_tracer *tracer, crowd *c, bool any)
 {
@@ -81,7 +65,12 @@ static inline bool make_round(pl_tracer *tracer, crowd *c, bool any)
         walk *k = &c->walks[i];
         if (!note(c, i, go_into(tracer, k, next_of(k) & PL_REF_INDEX))) return false;
     }
-    if (c->primitives && !try_primitives(tracer, c, any)) return false;
+    EACH(i, c->primitives) {
+        walk *k = &c->walks[i];
+        const pl_ref ref = next_of(k);
+        const enum kernel_verdict verdict = judge(tracer, k, ref, any);
+        if (verdict != MISS && !note(c, i, settle_primitive(tracer, k, ref, any && verdict == CERTAIN))) return false;
+    }
     EACH(i, c->returns) note(c, i, go_back(&c->walks[i]));
     return true;
 }
