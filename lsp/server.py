@@ -35,9 +35,10 @@ MANY_OBJECTS = 50_000
 SWITCH_S = 0.0002
 INPUT_BUFFER_BYTES = 1 << 18
 
-# Whole-file checks begin when nothing was typed for so long: their snapshot costs some milliseconds. A key that is held
-# down comes again after 33 ms, and that is all one burst.
-PAUSE_S = 0.05
+# Whole-file checks begin when nothing came for so long: messages that belong together come within some milliseconds.
+CHECKS_S = 0.01
+# What makes nobody wait but the next key (garbage, formats) is done in longer pauses.
+PAUSE_S = 0.1
 # When a pause is looked for again where something was to do just then.
 BUSY_S = 0.005
 
@@ -115,13 +116,21 @@ class Dispatcher:
             self._schedule()
 
     def _await_pause(self) -> None:
-        """Have ``_rest`` called when the client has said nothing for a while. Work that workers left is no reason to wait."""
+        """Have ``_check`` called when the client has said nothing for a while. Work that workers left is no reason to wait."""
         if self._pause is not None and self._has_heard:
             self._pause.cancel()
             self._pause = None
         if self._pause is None:
-            self._pause = asyncio.get_running_loop().call_later(PAUSE_S, self._rest)
+            self._pause = asyncio.get_running_loop().call_later(CHECKS_S, self._check)
         self._has_heard = False
+
+    def _check(self) -> None:
+        """All that came together is there: have it checked."""
+        if self.is_busy:
+            self._pause = asyncio.get_running_loop().call_later(BUSY_S, self._check)
+            return
+        self.session.start_checks()
+        self._pause = asyncio.get_running_loop().call_later(PAUSE_S - CHECKS_S, self._rest)
 
     def _rest(self) -> None:
         """The client has paused: do what need not be done between two keys."""
@@ -129,7 +138,6 @@ class Dispatcher:
             self._pause = asyncio.get_running_loop().call_later(BUSY_S, self._rest)
             return
         self._pause = None
-        self.session.start_checks()
         if self._has_closed:  # what was known about a file refers to itself
             self._has_closed = False
             gc.unfreeze()

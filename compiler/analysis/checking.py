@@ -313,7 +313,15 @@ def main() -> None:
         except EOFError:
             requests.put(None)
 
-    signal.signal(signal.SIGINT, work.interruption.interrupt)
+    def interrupt(*_: object) -> None:
+        if has_news():  # and hasn't been taken before the signal came
+            work.interruption.interrupt()
+
+    def has_news() -> bool:
+        return not requests.empty()
+
+    signal.signal(signal.SIGINT, interrupt)
+    work.interruption.has_news = has_news
 
     def send(answer: Answer) -> None:
         for piece in telling.in_pieces(answer):
@@ -332,7 +340,7 @@ def main() -> None:
                 return
             work.take(request)
         try:
-            work.go_on(send, lambda: not requests.empty())
+            work.go_on(send, has_news)
         except Exception:  # a mistake of ours must not end all checks
             send(work.give_up())
 

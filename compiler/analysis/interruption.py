@@ -16,7 +16,7 @@ Example::
 from __future__ import annotations
 
 from contextlib import contextmanager
-from typing import Iterator
+from typing import Callable, Iterator
 
 
 class Interrupted(Exception):
@@ -24,17 +24,21 @@ class Interrupted(Exception):
 
 
 class Interruption:
-    """``left`` is what was broken off last: whoever catches it may keep it, as letting go of all that was made takes longer
-    than the news should wait."""
+    """``has_news`` tells whether there is news already, of which the signal came while nothing could be interrupted. ``left`` is
+    what was broken off last: whoever catches it may keep it, as letting go of all that was made takes longer than the news
+    should wait."""
 
     def __init__(self) -> None:
         self._is_allowed = False
+        self.has_news: Callable[[], bool] = lambda: False
         self.left: Interrupted | None = None
 
     @contextmanager
     def allowed(self) -> Iterator[None]:
         self._is_allowed = True
         try:
+            if self.has_news():
+                raise Interrupted
             yield
         finally:
             self._is_allowed = False

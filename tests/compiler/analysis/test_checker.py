@@ -7,6 +7,7 @@ import queue
 import pytest
 from plsys.compiler.analysis import Checker, Project, telling
 from plsys.compiler.analysis.checking import Work
+from plsys.compiler.analysis.interruption import Interrupted, Interruption
 from plsys.compiler.analysis.whole import MAX_KNOWN, Result, Snapshot
 
 
@@ -106,3 +107,15 @@ def test_a_mesh_file_that_comes_and_goes(checker, results, tmp_path):
         change()
         project.file_changed(mesh)
         assert codes(checker, results, scene, document) == expected
+
+
+def test_news_that_came_while_nothing_could_be_interrupted():
+    """Its signal was in vain; a forecast that begins now would keep it waiting for seconds."""
+    interruption, done = Interruption(), []
+    interruption.has_news = lambda: True
+    with pytest.raises(Interrupted), interruption.allowed():
+        done.append("a forecast")
+    interruption.has_news = lambda: False
+    with interruption.allowed():
+        done.append("the next one")
+    assert done == ["the next one"]
