@@ -51,6 +51,7 @@ typedef struct pl_packet_frame {
     unsigned lanes;  /* those that meet the box */
     unsigned mapped; /* fours of rays that normative is known of */
     uint32_t instance;
+    uint32_t answers; /* of the work when t_max and lanes were set last */
     pl_beam beam;
     pl_lanes normative;
 } pl_packet_frame;
@@ -70,6 +71,7 @@ typedef struct pl_bvh_work {
     pl_packet_frame *packets;
     uint64_t *packet_stack;
     size_t packet_capacity, packet_stack_capacity;
+    uint32_t answers;    /* that a packet's queries got: as long as there are no more of them, nothing has changed */
     unsigned alone;      /* rays of a packet that go on one by one, the lowest first, its normative ray not yet told; or 0 */
     uint32_t alone_from; /* … from this frame on */
 } pl_bvh_work;

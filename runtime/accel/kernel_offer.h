@@ -134,6 +134,7 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     }
     wide_end();
     tracer->counters.primitive_tests += (unsigned)__builtin_popcount(lanes);
+    w->answers++;
     const pl_bvh_place place = {w->lanes, index, ref};
     pl_leaf leaf = pl_bvh_leaf(scene, item, &place);
     for (; lanes; lanes &= lanes - 1) {

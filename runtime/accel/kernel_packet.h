@@ -247,6 +247,7 @@ static bool visit_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, 
                         (any ? visit(tracer, &k, true) : visit(tracer, &k, false));
         w->alone = 0;
         if (!ok) return false;
+        w->answers += queries[lane].done || queries[lane].t_max != t_max[lane];
         t_max[lane] = queries[lane].t_max;
     }
     return true;
@@ -303,7 +304,8 @@ static inline bool offer_unbounded(pl_tracer *tracer, uint32_t index, unsigned l
 static inline bool enter_lanes(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, bool any,
                                bool *beams)
 {
-    pl_packet_frame *f = &((pl_bvh_work *)tracer->work)->packets[index];
+    pl_bvh_work *w = tracer->work;
+    pl_packet_frame *f = &w->packets[index];
     bool done;
     *beams = false;
     if (f->front->unbounded_count) {
@@ -311,15 +313,18 @@ static inline bool enter_lanes(pl_tracer *tracer, uint32_t index, unsigned lanes
         if (any) lanes = lanes_left(queries, lanes);
         if (done || !lanes) return true;
     }
+    f->answers = w->answers;
     enum course course = begin_lanes(f, lanes, t_max);
     if (course == AS_BEAM && !look_along(f)) course = ONE_BY_ONE;
     *beams = course == AS_BEAM;
     return course < ONE_BY_ONE || visit_one_by_one(tracer, index, f->lanes, course, queries, t_max, any);
 }
 
-/* Goes on with a frame after some of its rays met something. */
-static inline void go_on(pl_packet_frame *f, const pl_query *queries, const double *t_max, bool any)
+/* Goes on with a frame, some of whose rays may have met something. */
+static inline void go_on(pl_packet_frame *f, const pl_bvh_work *w, const pl_query *queries, const double *t_max, bool any)
 {
+    if (f->answers == w->answers) return;
+    f->answers = w->answers;
     if (any) {
         const unsigned left = lanes_left(queries, f->lanes);
         if (left && left != f->lanes) {
@@ -366,7 +371,7 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
         if (kind == PL_KIND_RETURN) {
             if (index == 0) break;
             f = &w->packets[--index];
-            go_on(f, queries, t_max, any);
+            go_on(f, w, queries, t_max, any);
         } else if (kind == PL_KIND_INSTANCE) {
             const uint32_t instance = ref & PL_REF_INDEX;
             const pl_front_instance *it = &f->front->instances[instance];
@@ -385,7 +390,7 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
                 stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
                 stack[top++] = entry_of(0.0f, f->front->root);
             } else {
-                go_on(f, queries, t_max, any);
+                go_on(f, w, queries, t_max, any);
             }
             if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
         } else {
@@ -399,8 +404,9 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
                 pl_query *query = &queries[__builtin_ctz(rest)];
                 query->found = query->done = true;
             }
+            w->answers += certain != 0;
             if (found & ~certain && !offer_lanes(tracer, index, ref, found & ~certain, queries, t_max)) return false;
-            go_on(f, queries, t_max, any);
+            go_on(f, w, queries, t_max, any);
             if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
         }
     next:;
