@@ -58,8 +58,8 @@ class Facts:
     """See the module. They stay the same object while one token at a time is edited (retouch.py). ``text`` is what was parsed;
     ``definitions`` are those that name something; ``blocks`` are scene blocks; ``assigned`` are the names that get values, in text order; ``ghosts`` are
     definitions of an earlier text that this one has lost to a syntax error; ``spans`` are all places in ``file``, if
-    there are no messages in ``syntax``; ``right`` is the last text that nothing was wrong
-    with, and when that was (Namespace.now)."""
+    there are no messages in ``syntax``; ``right`` are the last texts that nothing was wrong with, and when
+    that was (Namespace.now)."""
 
     text: bytes
     _tree: Tree | None
@@ -67,7 +67,7 @@ class Facts:
     spans: list[Span] = field(repr=False)
     syntax: list[Diagnostic]
     ghosts: dict[str, Definition] = field(default_factory=dict)
-    right: tuple[bytes, int] | None = None
+    right: dict[bytes, int] = field(default_factory=dict)
 
     @property
     def block(self) -> Block:

@@ -39,6 +39,9 @@ from .text import Block, Change
 # A change that adds so many blocks is a file that is opened: reading it takes longer than a request may wait.
 MANY_BLOCKS = 200
 
+# So many texts of a block are known to have been right, for what is typed to be taken back.
+RIGHT_TEXTS = 4
+
 _SINGLE = ("camera", "background")
 
 
@@ -217,7 +220,11 @@ class Scene:
     def _note_right(self, block: Block) -> None:
         """Note with the facts of a block that goes if all in it is known to be right."""
         if not (self._is_waiting(block) or self._messages.get(block) or facts_of(block).is_broken):
-            facts_of(block).right = block.data, self._names.now
+            right = facts_of(block).right
+            right.pop(block.data, None)
+            right[block.data] = self._names.now
+            if len(right) > RIGHT_TEXTS:
+                del right[next(iter(right))]
 
     def _is_waiting(self, block: Block) -> bool:
         """Whether a block is to be resolved."""
@@ -226,7 +233,8 @@ class Scene:
     def _is_right(self, block: Block) -> bool:
         """Whether an earlier block with the same text was right, and all names in it mean the same."""
         facts = facts_of(block)
-        return facts.right is not None and facts.right[0] == block.data and self._names.are_as(facts, facts.right[1])
+        moment = facts.right.get(block.data)
+        return moment is not None and self._names.are_as(facts, moment)
 
     def _forget(self, block: Block) -> None:
         waiting = self._edited, self._dirty, self._opened
