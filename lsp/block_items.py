@@ -13,27 +13,6 @@ from plsys.compiler.analysis import facts_of, syntax, vocabulary
 from . import snippets
 from .place import FORMS, Candidate, Place
 
-OBJECTS = ("object", "union", "sphere", "box", "cylinder", "cone", "plane", "torus", "triangle", "disc", "mesh")
-MOVES = ("translate", "rotate", "scale", "matrix")
-# Of blocks that aren't objects: the modifiers that they take.
-MODIFIERS = {"light_source": MOVES, "texture": MOVES, "pigment": MOVES}
-# The kinds of names that a block may begin with.
-NAMED = {
-    "object": ("selection", "object"),
-    "union": ("object",),
-    "texture": ("texture",),
-    "pigment": ("pigment",),
-    "finish": ("finish",),
-    "color_map": ("color_map",),
-}
-# The blocks that a block may hold; of a union and a mesh: before any modifier.
-NESTED = {
-    "union": OBJECTS,
-    "texture": ("pigment", "finish"),
-    "pigment": ("color_map",),
-    "mesh": ("triangle", "smooth_triangle"),
-    "object": OBJECTS,
-}
 # The types of the values that a block begins with, where its row has none.
 FIRST = {"light_source": ("vector",)}
 COLOUR_BLOCKS = ("background", "light_source", "pigment")
@@ -115,8 +94,9 @@ class BlockPlace(Place):
         """What an item of a block may begin with."""
         is_first = self.context.previous == "{"
         yield from self.properties(block)
-        modifiers = MODIFIERS.get(block, vocabulary.MODIFIERS if block in OBJECTS else ())
-        nested = NESTED.get(block, ())
+        row = vocabulary.BLOCKS.get(block)
+        modifiers = row.modifiers or (vocabulary.MODIFIERS if row.makes == "object" else ()) if row is not None else ()
+        nested = _inner_blocks(row.holds) if row is not None else ()
         is_made = block not in ("object", "union", "mesh") or not is_first
         if is_made:
             yield from (self.of_row(row, 3, snippets.property_(row)) for row in map(vocabulary.MODIFIERS.__getitem__, modifiers))
@@ -124,7 +104,7 @@ class BlockPlace(Place):
         if has_room:
             yield from self.blocks([name for name in nested if name not in modifiers or not is_made], 2)
         if is_first or block == "union" and has_room:
-            yield from self.names(NAMED.get(block, ()))
+            yield from self.names(row.begins if row is not None else ())
         if block in COLOUR_BLOCKS:
             yield from self.colour_words()
             yield from self.colours(names_only=True)
@@ -158,7 +138,7 @@ class BlockPlace(Place):
         if previous in ("{", "]"):
             yield Candidate("[ ]", "snippet", 0, "a position from 0 to 1, and its colour", "[${1:0} color rgb <${2:1}, ${3:1}, ${4:1}>]", "[")
             if previous == "{":
-                yield from self.names(NAMED["color_map"])
+                yield from self.names(vocabulary.BLOCKS["color_map"].begins)
         elif previous == "[" or previous in VALUE_MARKS:
             yield from self.block_values(with_axes=False)
         elif previous in vocabulary.COLOUR_WORDS:
@@ -176,3 +156,7 @@ class BlockPlace(Place):
     def is_texture_operator(self) -> bool:
         owner = self.context.owner.encode()
         return bool(owner) and re.search(rb"\bTexture\s+" + re.escape(owner) + rb"\b", self.before) is not None
+
+
+def _inner_blocks(holds: tuple[str, ...]) -> tuple[str, ...]:
+    return vocabulary.OBJECT_BLOCKS if "object" in holds else holds

@@ -15,11 +15,11 @@ from typing import Iterator
 from plsys.compiler.analysis import CODES, Context, Document, Scene, insights_of, syntax, vocabulary
 
 from . import prose, snippets
-from .block_items import OBJECTS, VALUE_MARKS, BlockPlace
+from .block_items import VALUE_MARKS, BlockPlace
 from .place import Candidate, Row
 
-TOP_BLOCKS = ("global_settings", "background", "camera", "light_source", *OBJECTS)
-DECLARED = ("texture", "pigment", "finish", "color_map", *OBJECTS)
+TOP_BLOCKS = tuple(row.name for row in vocabulary.BLOCKS.values() if row.makes != "texture")
+DECLARED = tuple(row.name for row in vocabulary.BLOCKS.values() if row.makes != "scene")
 SCENE_FILES = (".plsys",)
 MESH_FILES = (".obj", ".ply")
 _MESH = re.compile(rb"\bmesh\s*\(\s*\"([^\"\r\n]*)$")

@@ -15,12 +15,11 @@ from dataclasses import dataclass, field
 from typing import Any, Iterable, Iterator, NamedTuple
 
 from ..reading import syntax, vocabulary
-from ..reading.resolve_names import OBJECT_BLOCKS
 from .facts import Facts, facts_of
 from .text import Block
 
 _SHARED = frozenset(("value", "input", "texture", "pigment", "finish", "color_map"))
-_GENERAL = frozenset(("camera", "light_source", "background", "global_settings"))
+_GENERAL = frozenset(row.name for row in vocabulary.BLOCKS.values() if row.makes == "scene")
 
 
 class Role(NamedTuple):
@@ -53,7 +52,7 @@ def _role(facts: Facts) -> Role:
             kind = "general" if facts.blocks or facts.includes else "shared"
         elif not facts.blocks and all(_is_shared(each, names - defined) for each in facts.definitions):
             kind = "shared"
-    places = any(each.name.name in OBJECT_BLOCKS for each in facts.blocks)
+    places = any(each.name.name in vocabulary.OBJECT_BLOCKS for each in facts.blocks)
     return Role(kind, frozenset(names), frozenset(defined), frozenset(assigned), places, bool(facts.includes))
 
 

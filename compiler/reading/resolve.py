@@ -25,7 +25,7 @@ from .problems import Problem
 from .resolve_blocks import Blocks, Values
 from .resolve_expressions import BLOCKS, INPUTS, Expressions, Value
 from .resolve_items import Items
-from .resolve_names import ARTICLES, OBJECT_BLOCKS, Entry, Names
+from .resolve_names import ARTICLES, Entry, Names
 from .resolve_objects import Objects, split
 from .resolve_operators import Operators
 from .resolve_rules import Rules
@@ -33,7 +33,7 @@ from .resolve_terms import Terms
 from .resolve_textures import Textures
 from .source import Source, Span
 from .vocabulary import BLOCKS as BLOCK_ROWS
-from .vocabulary import MODIFIERS, PRIMITIVES
+from .vocabulary import MODIFIERS, OBJECT_BLOCKS, PRIMITIVES
 
 
 def resolve(

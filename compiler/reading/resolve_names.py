@@ -47,10 +47,6 @@ ARTICLES = {
     "colour": "a colour",
 }
 
-OBJECT_BLOCKS = (
-    "object union sphere box cylinder cone plane torus triangle smooth_triangle disc mesh".split()
-)  # fmt: skip
-
 
 @dataclass
 class Entry:

@@ -19,13 +19,13 @@ from .model import Enter, Mesh, MeshLeaf, NoShadow, Operand, Operator, Paint, Pr
 from .problems import Problem
 from .resolve_expressions import ARGUMENTS, BLOCKS, Expressions
 from .resolve_items import Items
-from .resolve_names import OBJECT_BLOCKS, Entry, Names
+from .resolve_names import Entry, Names
 from .resolve_shapes import corners, shape
 from .resolve_terms import Terms
 from .resolve_textures import TRANSFORMATIONS, Look, Textures
 from .source import Span
 from .vocabulary import BLOCKS as BLOCK_ROWS
-from .vocabulary import MODIFIERS
+from .vocabulary import MODIFIERS, OBJECT_BLOCKS
 
 # What other languages have as a name, and here is a difference.
 SIGNED_NAME = re.compile(r"[A-Za-z_]\w*(?:-[A-Za-z_]\w*)+", re.ASCII)

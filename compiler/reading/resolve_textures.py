@@ -23,7 +23,7 @@ from .source import Span
 from .vocabulary import MODIFIERS, PROPERTIES
 
 PATTERNS = {"solid": 0, "checker": 1, "gradient": 2}  # ids of runtime/bytecode.toml's patterns
-TRANSFORMATIONS = ("translate", "rotate", "scale", "matrix")
+TRANSFORMATIONS = vocabulary.BLOCKS["pigment"].modifiers
 
 ColourEntry = tuple[Expression, ...]  # position, red, green, blue, filter, transmit
 

@@ -67,6 +67,10 @@ class Row:
     range: Interval | None = None
     default: object = None
     povray: str = ""
+    makes: str = ""
+    begins: tuple[str, ...] = ()
+    holds: tuple[str, ...] = ()
+    modifiers: tuple[str, ...] = ()
 
     def accepts(self, count: int) -> bool:
         """Whether ``count`` arguments fit."""
@@ -89,7 +93,7 @@ def _row(key: str, fields: dict) -> Row:
     kind, *path = key.split(".")
     values = dict(fields)
     interval = values.pop("range", "")
-    for name in ("arity", "types"):
+    for name in ("arity", "types", "begins", "holds", "modifiers"):
         values[name] = tuple(values.get(name, ()))
     block = path[0] if kind == "property" else ""
     return Row(kind, path[-1], block, range=Interval.parse(interval) if interval else None, **values)
@@ -110,6 +114,7 @@ CONSTANTS = _kind("constant")
 AXES = _kind("axis")
 OPERATIONS = _kind("operation")
 BLOCKS = _kind("block")
+OBJECT_BLOCKS = tuple(row.name for row in BLOCKS.values() if row.makes == "object")
 MODIFIERS = _kind("modifier")
 COLOUR_WORDS = _kind("colourword")
 PROPERTIES: dict[str, dict[str, Row]] = {}

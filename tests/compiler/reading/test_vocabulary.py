@@ -71,6 +71,23 @@ def test_patterns_and_steps_agree_with_the_bytecode():
     assert {row["name"]: row["id"] for row in BYTECODE["pattern"]} == PATTERNS
 
 
+def test_what_blocks_hold():
+    """A row's words are rows themselves, and a scene is read as they say."""
+    for name, row in vocabulary.BLOCKS.items():
+        assert row.makes in ("object", "scene", "texture"), name
+        assert set(row.holds) <= set(vocabulary.BLOCKS) and set(row.modifiers) <= set(vocabulary.MODIFIERS), name
+        for modifier in row.modifiers:
+            value = "<1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0>" if modifier == "matrix" else "<1, 2, 3>"
+            inside = {"light_source": "<0, 0, 9> color rgb 1", "pigment": "checker", "texture": "pigment { checker }"}[name]
+            block = f"{name} {{ {inside} {modifier} {value} }}"
+            good(block if row.makes == "scene" else f"sphere {{ 0, 1 {block} }}")
+    for name in vocabulary.OBJECT_BLOCKS:
+        example = vocabulary.BLOCKS[name].example.rpartition("\n")[2]
+        if name != "object":
+            good(f"union {{ {example} }}")
+            good(f"#declare Thing = {example}\nobject {{ Thing }}")
+
+
 def test_intervals():
     interval = Interval.parse("(0, 180)")
     assert (0 in interval, 1 in interval, 180 in interval) == (False, True, False)
