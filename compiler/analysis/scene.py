@@ -184,9 +184,11 @@ class Scene:
             known += places
 
     def _is_right_but_at(self, block: Block, places: list[Span]) -> bool:
-        """Whether nothing is known to be wrong with ``block`` but what is in ``places``."""
+        """Whether nothing is known to be wrong with ``block`` but what is in ``places``. (Of a second definition nothing is
+        known but that it is one.)"""
         return all(
-            any(place.start <= each.span.start and each.span.end <= place.end for place in places)
+            each.code != "duplicate-name"
+            and any(place.start <= each.span.start and each.span.end <= place.end for place in places)
             for each in self._messages.get(block, ())
         )
 

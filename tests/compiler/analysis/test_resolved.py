@@ -123,3 +123,16 @@ def test_typing_a_scene_from_its_first_to_its_last_character():
         project.messages(document)
     check_whole(project.scene_of(document))
     assert told(project, document) == []
+
+
+@pytest.mark.parametrize("old, new", [(b"Selection Tree { Twig", b"Selection Bush { Twig"), (b"Tree { Tree", b"Bush { Tree")], ids=["renamed", "the first one renamed"])
+def test_a_second_definition_becomes_the_only_one(old, new):
+    """Nothing but that it is a second one is said of it before, and all then."""
+    text = b"object { Tree }\nSelection Tree { Tree -> box; }\nSelection Tree { Twig -> box; }\n"
+    project, fresh = Project(), Project()
+    document = project.open(None, text, name="x")
+    assert [code for _, _, code, *_ in told(project, document)] == ["duplicate-name"]
+    project.edit(document, text.index(old), text.index(old) + len(old), new)
+    now = told(project, document)
+    assert now == told(fresh, fresh.open(None, document.text.data, name="x"))
+    assert "wrong-kind" in {code for _, _, code, *_ in now}
