@@ -1,15 +1,19 @@
 /* cut.c - the gates of instances (cut.h). */
 #include "cut.h"
 
+#include <string.h>
+
 #include "random.h"
 
 /* How much wider boxes are where they end what stands below: for its own slack, and for roundings of composed maps. */
 #define ROOM_SLACK 4.0
 #define ROOM_SIZE 0x1p-30
 
-static pl_span clip(const pl_box *box, const double o[3], const double d[3], double slack, pl_span within)
+/* In line, since a span that is returned in registers is put together again through memory, which stalls. */
+static inline __attribute__((always_inline)) pl_span clip(const pl_box *box, const double o[3], const double d[3], double slack,
+                                                          pl_span within)
 {
-    pl_slab slab = pl_slab_of(o, d, slack);
+    const pl_slab slab = pl_slab_of(o, d, slack);
     for (int axis = 0; axis < 3; axis++) {
         double near_plane = slab.negative[axis] ? box->hi[axis] : box->lo[axis];
         double far_plane = slab.negative[axis] ? box->lo[axis] : box->hi[axis];
@@ -24,27 +28,58 @@ static pl_span clip(const pl_box *box, const double o[3], const double d[3], dou
 /* Sums of coordinates are as far off as these together, and round. */
 #define BEVEL_SLACK 4.0
 
-static pl_span clip_bevels(const pl_gate_box *gate, const double o[3], const double d[3], double slack, pl_span within)
+/* Bevels in pairs: v along x + y and x - y, and so on, in their order. */
+typedef double pair __attribute__((vector_size(16)));
+typedef long long pair_mask __attribute__((vector_size(16)));
+typedef float pair_single __attribute__((vector_size(8)));
+enum { PAIRS = PL_GATE_BEVELS / 2 };
+
+static inline void pairs_along(const double v[3], pair along[PAIRS])
 {
-    double at[PL_GATE_BEVELS], along[PL_GATE_BEVELS], enter[PL_GATE_BEVELS], leave[PL_GATE_BEVELS];
-    pl_gate_bevels(o, at);
-    pl_gate_bevels(d, along);
-    for (int i = 0; i < PL_GATE_BEVELS; i++) {
-        const double inverse = 1.0 / along[i];
-        const double low = ((double)gate->low[i] - BEVEL_SLACK * slack - at[i]) * inverse;
-        const double high = ((double)gate->high[i] + BEVEL_SLACK * slack - at[i]) * inverse;
-        enter[i] = inverse < 0.0 ? high : low;
-        leave[i] = inverse < 0.0 ? low : high;
+    const pair x = {v[0], v[0]}, y = {v[1], v[1]}, plus_minus_y = {v[1], -v[1]}, plus_minus_z = {v[2], -v[2]};
+    along[0] = x + plus_minus_y;
+    along[1] = x + plus_minus_z;
+    along[2] = y + plus_minus_z;
+    along[3] = (pair){along[0][0], along[0][0]} + plus_minus_z;
+    along[4] = (pair){along[0][1], along[0][1]} + plus_minus_z;
+}
+
+static inline pair pick(pair_mask first, pair a, pair b)
+{
+    return (pair)(((pair_mask)a & first) | ((pair_mask)b & ~first));
+}
+
+static inline pair pair_of(const float *at)
+{
+    pair_single two;
+    memcpy(&two, at, sizeof two);
+    return __builtin_convertvector(two, pair);
+}
+
+static inline __attribute__((always_inline)) pl_span clip_bevels(const pl_gate_box *gate, const double o[3], const double d[3],
+                                                                 double slack, pl_span within)
+{
+    pair at[PAIRS], along[PAIRS], enter = {within.enter, within.enter}, leave = {within.leave, within.leave};
+    const double room = BEVEL_SLACK * slack;
+    pairs_along(o, at);
+    pairs_along(d, along);
+    for (int i = 0; i < PAIRS; i++) {
+        const pair inverse = 1.0 / along[i];
+        const pair low = (pair_of(gate->low + 2 * i) - room - at[i]) * inverse;
+        const pair high = (pair_of(gate->high + 2 * i) + room - at[i]) * inverse;
+        const pair_mask back = inverse < 0.0;
+        const pair near = pick(back, high, low), far = pick(back, low, high);
+        /* A ray in a plane gives NaN, which is left aside; along -0 as well as along 0 it is between planes or not. */
+        enter = pick(near > enter, near, enter);
+        leave = pick(far < leave, far, leave);
     }
-    /* A ray in a plane gives NaN, which is left aside; along -0 as well as along 0 it is between planes or not. */
-    for (int i = 0; i < PL_GATE_BEVELS; i++) {
-        within.enter = enter[i] > within.enter ? enter[i] : within.enter;
-        within.leave = leave[i] < within.leave ? leave[i] : within.leave;
-    }
+    within.enter = enter[0] > enter[1] ? enter[0] : enter[1];
+    within.leave = leave[0] < leave[1] ? leave[0] : leave[1];
     return within;
 }
 
-static pl_span clip_gate(const pl_gate_box *gate, const double o[3], const double d[3], double slack, pl_span within)
+static inline __attribute__((always_inline)) pl_span clip_gate(const pl_gate_box *gate, const double o[3], const double d[3],
+                                                               double slack, pl_span within)
 {
     within = clip(&gate->box, o, d, slack, within);
     return gate->bevelled && within.enter <= within.leave ? clip_bevels(gate, o, d, slack, within) : within;

@@ -92,23 +92,43 @@ static double reach_of(const pl_hull *hull)
     return pl_box_reach(&box);
 }
 
-/* v lies between three directions of the lattice: those at the corners of half a square of the surface. Roundings, in proportion
- * to the hull's reach, are left to the caller. */
-static inline double support_along(const pl_hull *hull, const double v[3])
+/* Where a direction lies on the lattice: between three at the corners of half a square of the surface. */
+typedef struct cell {
+    int corner, step, across; /* from the middle to one corner, from there to the next and to the opposite one */
+    double weights[3], scale; /* scale 0: no direction */
+} cell;
+
+static inline cell cell_of(const double v[3])
 {
     const double a[3] = {fabs(v[0]), fabs(v[1]), fabs(v[2])};
     const int first = a[1] > a[0], most = a[2] > a[first] ? 2 : first, second = most == 2 ? 0 : !first, third = 3 - most - second;
-    if (!(a[most] > 0.0)) return 0.0;
+    if (!(a[most] > 0.0)) return (cell){.scale = 0.0};
     const double in_cells = N / a[most];
     double x = a[second] * in_cells, y = a[third] * in_cells;
     const int column = x < N ? (int)x : N - 1, row = y < N ? (int)y : N - 1;
     const int right = v[second] < 0.0 ? -strides[second] : strides[second], up = v[third] < 0.0 ? -strides[third] : strides[third];
-    const double *h = hull->support + PL_HULL_MIDDLE + (v[most] < 0.0 ? -N : N) * strides[most] + column * right + row * up;
     x -= column;
     y -= row;
-    const double sum = x >= y ? (1.0 - x) * h[0] + (x - y) * h[right] + y * h[right + up]
-                              : (1.0 - y) * h[0] + (y - x) * h[up] + x * h[right + up];
-    return sum * (a[most] / N);
+    const double more = x >= y ? x : y, less = x >= y ? y : x;
+    return (cell){.corner = (v[most] < 0.0 ? -N : N) * strides[most] + column * right + row * up,
+                  .step = x >= y ? right : up,
+                  .across = right + up,
+                  .weights = {1.0 - more, more - less, less},
+                  .scale = a[most] / N};
+}
+
+/* The support there; side -1: in the opposite direction. Roundings, in proportion to the hull's reach, are left to the caller. */
+static inline double support_at(const pl_hull *hull, const cell *at, int side)
+{
+    if (at->scale == 0.0) return 0.0;
+    const double *h = hull->support + PL_HULL_MIDDLE + side * at->corner;
+    return (at->weights[0] * h[0] + at->weights[1] * h[side * at->step] + at->weights[2] * h[side * at->across]) * at->scale;
+}
+
+static inline double support_along(const pl_hull *hull, const double v[3])
+{
+    const cell at = cell_of(v);
+    return support_at(hull, &at, 1);
 }
 
 /* How far roundings may move a point, along a unit of each axis, that is mapped from within `reach`. Not in proportion to the result:
@@ -120,13 +140,20 @@ static double slack_under(const pl_affine *to_parent, double reach)
     return ROUNDINGS * size;
 }
 
+/* Direction d as it is below a map, and how far the map moves the set along it. */
+static double turn_back(const pl_affine *to_parent, const double d[3], double v[3])
+{
+    const double *m = to_parent->m;
+    for (int axis = 0; axis < 3; axis++) v[axis] = d[0] * m[axis] + d[1] * m[4 + axis] + d[2] * m[8 + axis];
+    return d[0] * m[3] + d[1] * m[7] + d[2] * m[11];
+}
+
 /* The support in direction d of the set mapped. */
 static double support_under(const pl_affine *to_parent, const pl_hull *hull, const double d[3])
 {
-    const double *m = to_parent->m;
     double v[3];
-    for (int axis = 0; axis < 3; axis++) v[axis] = d[0] * m[axis] + d[1] * m[4 + axis] + d[2] * m[8 + axis];
-    return support_along(hull, v) + (d[0] * m[3] + d[1] * m[7] + d[2] * m[11]);
+    const double move = turn_back(to_parent, d, v);
+    return support_along(hull, v) + move;
 }
 
 void pl_hull_through(const pl_affine *to_parent, pl_hull *hull)
@@ -144,11 +171,10 @@ pl_box pl_hull_box_under(const pl_affine *to_parent, const pl_hull *hull)
     const double slack = slack_under(to_parent, reach_of(hull));
     pl_box box;
     for (int axis = 0; axis < 3; axis++) {
-        double d[3] = {0.0, 0.0, 0.0};
-        d[axis] = -1.0;
-        box.lo[axis] = -support_under(to_parent, hull, d) - slack;
-        d[axis] = 1.0;
-        box.hi[axis] = support_under(to_parent, hull, d) + slack;
+        const double *row = to_parent->m + 4 * axis;
+        const cell at = cell_of(row);
+        box.lo[axis] = row[3] - support_at(hull, &at, -1) - slack;
+        box.hi[axis] = row[3] + support_at(hull, &at, 1) + slack;
     }
     return box;
 }
@@ -266,6 +292,13 @@ static double support_under_entries(const pl_range_map *map, const pl_hull *belo
     return largest + hi[3] + 4.0 * ROUNDINGS * size;
 }
 
+static double with_slack(double support, double slack)
+{
+    const double sum = support + slack;
+    return isnan(sum) ? INFINITY : sum;
+}
+
+/* Two opposite directions at a time: they lie on the lattice alike. */
 void pl_hull_through_range(const pl_range_map *map, pl_hull *hull)
 {
     const pl_hull below = *hull;
@@ -275,13 +308,24 @@ void pl_hull_through_range(const pl_range_map *map, pl_hull *hull)
     double slack = 0.0;
     for (int k = 0; known && k < c.count; k++) slack = fmax(slack, N * slack_under(&c.list[k], reach));
     if (known) slack += 16.0 * ROUNDINGS * N * c.largest * (1.0 + 3.0 * reach);
-    for (int i = 0; i < PL_HULL_CELLS; i++) {
-        double d[3], sum = -INFINITY;
+    for (int i = 0; i < PL_HULL_MIDDLE; i++) {
+        double d[3], sum = -INFINITY, opposite = -INFINITY;
         if (!direction_of(i, d)) continue;
-        if (!known) sum = support_under_entries(map, &below, reach, d);
-        for (int k = 0; known && k < c.count; k++) sum = fmax(sum, support_under(&c.list[k], &below, d));
-        sum += slack;
-        hull->support[i] = isnan(sum) ? INFINITY : sum;
+        const double back[3] = {-d[0], -d[1], -d[2]};
+        if (!known) {
+            sum = support_under_entries(map, &below, reach, d);
+            opposite = support_under_entries(map, &below, reach, back);
+        }
+        for (int k = 0; known && k < c.count; k++) {
+            double v[3];
+            const double move = turn_back(&c.list[k], d, v);
+            const cell at = cell_of(v);
+            const double ahead = support_at(&below, &at, 1) + move, behind = support_at(&below, &at, -1) - move;
+            sum = ahead > sum ? ahead : sum;
+            opposite = behind > opposite ? behind : opposite;
+        }
+        hull->support[i] = with_slack(sum, slack);
+        hull->support[PL_HULL_CELLS - 1 - i] = with_slack(opposite, slack);
     }
 }
 

@@ -37,9 +37,9 @@ static inline pl_reach pl_reach_leaf(double size)
 
 static inline void pl_reach_join(pl_reach *reach, const pl_reach *other)
 {
-    reach->gain = fmax(reach->gain, other->gain);
-    reach->base = fmax(reach->base, other->base);
-    reach->size = fmax(reach->size, other->size);
+    reach->gain = other->gain > reach->gain ? other->gain : reach->gain; /* none is NaN; fmax is a call */
+    reach->base = other->base > reach->base ? other->base : reach->base;
+    reach->size = other->size > reach->size ? other->size : reach->size;
 }
 
 static inline double pl_reach_slack(const pl_reach *reach, const double o[3])

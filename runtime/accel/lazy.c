@@ -19,21 +19,31 @@
 #define MOST_WORK (UINT64_C(1) << 24)
 enum { MOST_UNKNOWN = PL_LIMIT_DEPTH + 1024 };
 
+/* A ray in the frame of an instance. */
+typedef struct place {
+    double o[3], d[3];
+    double stretch; /* with cut-offs: the product of stretches */
+    double leave;   /* with cut-offs: from there on nothing stands below */
+} place;
+
 /* Frames are the instances on one path from the root, so frame i is the parent of frame i + 1. */
 typedef struct frame {
     pl_lazy_state *state; /* NULL: its half of the cache is gone */
     uint32_t symbol, terms; /* terms on the path up to here */
     uint32_t item;          /* of the frame before, by which this one was reached */
     bool spanned;           /* `inside` is known */
-    double o[3], d[3];
-    double stretch; /* with cut-offs: the product of stretches */
-    double leave;   /* with cut-offs: from there on nothing stands below */
+    place at;
     pl_span inside; /* with cut-offs: of what stands below */
 } frame;
 
+/* An item that is still to be visited. With cut-offs a ray has gone as far as the gates of those that enter states: these say
+ * more than boxes would, and most boxes that it meets have gates that it meets. */
 typedef struct pending {
     double t_entry;
     uint32_t frame, item;
+    bool arrived; /* `at` is known … */
+    bool open;    /* … and the gate is clearly open */
+    place at;
 } pending;
 
 typedef struct work {
@@ -107,10 +117,10 @@ static inline pl_span clip(const pl_slab *slab, const float planes[6], double ro
 
 /* How far out of a box that holds primitives what is cut may stand that is drawn instead of some of them: it is no larger than a
  * footprint. */
-static inline double room_of(const work *w, const frame *f)
+static inline double room_of(const work *w, const place *at)
 {
-    const double footprint = w->footprint.width + (w->footprint.spread > 0.0 ? w->footprint.spread * f->leave : 0.0);
-    return footprint / f->stretch * (1.0 + 0x1p-20);
+    const double footprint = w->footprint.width + (w->footprint.spread > 0.0 ? w->footprint.spread * at->leave : 0.0);
+    return footprint / at->stretch * (1.0 + 0x1p-20);
 }
 
 /* Asks for a state's memory before the ray comes to it: what stands near the bottom of a tree is in no cache. */
@@ -120,31 +130,71 @@ static inline void fetch(const pl_lazy_state *state)
     for (int line = 0; line < 5; line++) __builtin_prefetch((const char *)state + 64 * line);
 }
 
-/* Pushes the items that the ray meets, the nearest last. */
-static bool push_items(work *w, uint32_t index, pl_query *query, pl_counters *counters)
+static inline void map_down(const pl_lazy_item *it, place *at)
 {
-    const frame *f = &w->frames[index];
-    const pl_lazy_state *state = f->state;
+    for (uint32_t i = 0; i < it->transform_count; i++) pl_map_ray(it->transforms[i], at->o, at->d);
+}
+
+/* Goes as far as the gate of an item that enters a state. false: it is missed. */
+static inline bool arrive(const work *w, const pl_lazy_item *it, const pl_query *query, pending *next)
+{
+    const pl_gate_box *gate = it->gate;
+    const double *stretches = pl_lazy_stretches(it);
+    map_down(it, &next->at);
+    for (uint32_t i = 0; i < it->transform_count; i++) next->at.stretch *= stretches[i];
+    next->arrived = next->open = true;
+    if (gate->unbounded) return true;
+    const pl_span own = pl_gate_span(gate, next->at.o, next->at.d, (pl_span){query->t_min, query->t_max});
+    if (!(own.enter <= own.leave)) return false;
+    next->t_entry = own.enter;
+    next->at.leave = own.leave;
+    next->open = is_open(w, gate->diameter * next->at.stretch, own.leave);
+    return true;
+}
+
+/* Puts what was written behind the stack's last entry into its place among those from `first` on, the nearest last. */
+static inline void insert(work *w, size_t first)
+{
+    size_t place = w->stack_count++;
+    if (place == first || !(w->stack[place - 1].t_entry < w->stack[place].t_entry)) return;
+    const pending next = w->stack[place];
+    for (; place > first && w->stack[place - 1].t_entry < next.t_entry; place--) w->stack[place] = w->stack[place - 1];
+    w->stack[place] = next;
+}
+
+/* Pushes the items that the ray meets. */
+static bool push_items(work *w, uint32_t index, bool gates, pl_query *query, pl_counters *counters)
+{
+    const place *from = &w->frames[index].at;
+    const pl_lazy_state *state = w->frames[index].state;
     const size_t first = w->stack_count;
-    const pl_slab slab = pl_slab_of(f->o, f->d, pl_reach_slack(&state->reach, f->o));
-    const double room = room_of(w, f);
+    const pl_slab slab = pl_slab_of(from->o, from->d, pl_reach_slack(&state->reach, from->o));
+    if (!grow(&w->stack, w->stack_count + state->item_count, &w->stack_capacity, sizeof *w->stack, query->error)) return false;
     for (uint32_t i = 0; i < state->item_count; i++) {
         const pl_lazy_item *it = &state->items[i];
-        pl_span span = {query->t_min, query->t_max};
+        pending *next = &w->stack[w->stack_count];
+        bool met = true;
         if (query->shadow && it->no_shadow) continue;
-        if (!it->unbounded) {
+        next->t_entry = query->t_min;
+        next->frame = index;
+        next->item = i;
+        next->arrived = false;
+        if (it->boxed) {
+            const pl_span span = clip(&slab, it->box, it->whole ? 0.0 : room_of(w, from), query->t_min, query->t_max);
             counters->box_tests++;
-            if (!(it->box[0] <= it->box[3])) continue;
-            span = clip(&slab, it->box, it->whole ? 0.0 : room, span.enter, span.leave);
-            if (!(span.enter <= span.leave)) {
-                if (index > counters->miss_depth) counters->miss_depth = index;
-                continue;
-            }
+            next->t_entry = span.enter;
+            met = it->box[0] <= it->box[3] && span.enter <= span.leave;
         }
-        if (!grow(&w->stack, w->stack_count, &w->stack_capacity, sizeof *w->stack, query->error)) return false;
-        size_t place = w->stack_count++;
-        for (; place > first && w->stack[place - 1].t_entry < span.enter; place--) w->stack[place] = w->stack[place - 1];
-        w->stack[place] = (pending){span.enter, index, i};
+        if (met && gates && it->kind == PL_NODE_ENTER) {
+            counters->box_tests++;
+            next->at = *from;
+            met = arrive(w, it, query, next);
+        }
+        if (!met) {
+            if (index > counters->miss_depth) counters->miss_depth = index;
+            continue;
+        }
+        insert(w, first);
         fetch(atomic_load_explicit(&it->state, memory_order_relaxed));
     }
     return true;
@@ -164,7 +214,7 @@ static pl_span span_of(work *w, size_t index)
     for (size_t i = known + 1; i <= index; i++) {
         frame *f = &w->frames[i];
         const pl_lazy_item *it = &w->frames[i - 1].state->items[f->item];
-        f->inside = pl_span_below(it->gate, f->o, f->d, w->frames[i - 1].inside);
+        f->inside = pl_span_below(it->gate, f->at.o, f->at.d, w->frames[i - 1].inside);
         f->spanned = true;
     }
     return w->frames[index].inside;
@@ -211,28 +261,29 @@ static pl_lazy_state *state_of(pl_tracer *tracer, size_t index, pl_error *error)
     return w->frames[index].state;
 }
 
-/* Goes into an instance whose ray stands in f: by an item of the last frame, or the scene itself (NULL). */
-static bool enter(pl_tracer *tracer, pl_lazy_item *it, const frame *as, pl_query *query)
+/* Goes into an instance, that of a frame that is complete but for its state: by an item of the frame before, or the scene itself
+ * (NULL). */
+static bool enter(pl_tracer *tracer, pl_lazy_item *it, pl_query *query)
 {
     work *w = tracer->work;
-    frame f = *as;
-    f.symbol = it ? it->what : UINT32_MAX;
-    if (w->frame_count > PL_LIMIT_DEPTH)
-        return pl_fail_at(query->error, PL_ERROR_LIMIT, tracer->scene->program, f.symbol,
+    const uint32_t index = (uint32_t)w->frame_count;
+    frame *f = &w->frames[index];
+    f->symbol = it ? it->what : UINT32_MAX;
+    if (index > PL_LIMIT_DEPTH)
+        return pl_fail_at(query->error, PL_ERROR_LIMIT, tracer->scene->program, f->symbol,
                           "depth: a ray came %d symbols deep, which is the limit; does the recursion end?", PL_LIMIT_DEPTH);
-    if (!grow(&w->frames, w->frame_count, &w->frame_capacity, sizeof *w->frames, query->error)) return false;
-    f.state = it ? atomic_load_explicit(&it->state, memory_order_acquire) : NULL;
-    w->found += f.state != NULL;
-    w->frames[w->frame_count++] = f;
-    if (!f.state) {
+    f->state = it ? atomic_load_explicit(&it->state, memory_order_acquire) : NULL;
+    w->found += f->state != NULL;
+    w->frame_count++;
+    if (!f->state) {
         const uint32_t changes = w->changes;
-        pl_lazy_state *state = state_of(tracer, w->frame_count - 1, query->error);
+        pl_lazy_state *state = state_of(tracer, index, query->error);
         if (!state) return false;
         if (it && w->changes == changes) atomic_store_explicit(&it->state, state, memory_order_release);
     }
     if (w->spent > MOST_WORK)
-        return fail_work(tracer->scene, f.symbol, "needed to visit more nodes of the graph than", MOST_WORK, query->error);
-    return push_items(w, (uint32_t)w->frame_count - 1, query, &tracer->counters);
+        return fail_work(tracer->scene, f->symbol, "needed to visit more nodes of the graph than", MOST_WORK, query->error);
+    return push_items(w, index, tracer->scene->gates != NULL, query, &tracer->counters);
 }
 
 static bool write_path(const void *context, pl_path *path)
@@ -256,62 +307,47 @@ static pl_gate decide(pl_tracer *tracer, const pl_lazy_item *it, frame *f, pl_qu
 {
     work *w = tracer->work;
     const pl_span within = span_of(w, w->frame_count - 1);
-    pl_arrival at = {0, f->o, f->d, f->stretch, within, (uint32_t)w->frame_count};
+    pl_arrival at = {0, f->at.o, f->at.d, f->at.stretch, within, (uint32_t)w->frame_count};
     double t_entry;
-    const pl_gate gate = pl_gate_at(it->gate, f->o, f->d, f->stretch, &query->footprint, within, query->t_min,
+    const pl_gate gate = pl_gate_at(it->gate, f->at.o, f->at.d, f->at.stretch, &query->footprint, within, query->t_min,
                                     query->t_max, &t_entry, &f->inside);
     f->spanned = gate == PL_GATE_OPEN;
     if (gate != PL_GATE_CUT || !(t_entry < query->t_max)) return gate;
     pl_leaf leaf = {.path = write_path, .source = w};
     const uint64_t hash = pl_cut_hash(0, w->path.terms, w->path.length);
-    const double coverage = pl_lazy_coverage(w->unfolder, it->what, it->scope, f->d);
+    const double coverage = pl_lazy_coverage(w->unfolder, it->what, it->scope, f->at.d);
     *ok = pl_query_cut_box(query, it->gate, coverage, &at, hash, t_entry, &leaf);
     return gate;
 }
 
-/* Whether an instance is to be gone into whose ray stands in f, with the stretch above it. */
-static bool pass_gate(pl_tracer *tracer, const pl_lazy_item *it, frame *f, pl_query *query, bool *ok)
-{
-    const work *w = tracer->work;
-    const pl_gate_box *gate = it->gate;
-    f->spanned = false;
-    if (!tracer->scene->gates) return true;
-    const double *stretches = pl_lazy_stretches(it);
-    for (uint32_t i = 0; i < it->transform_count; i++) f->stretch *= stretches[i];
-    if (gate->unbounded) return true;
-    const pl_span all = {query->t_min, query->t_max};
-    const pl_span own = pl_gate_span(gate, f->o, f->d, all);
-    if (!(own.enter <= own.leave)) return false;
-    f->leave = own.leave;
-    return is_open(w, gate->diameter * f->stretch, own.leave) || decide(tracer, it, f, query, ok) == PL_GATE_OPEN;
-}
-
-/* An item of the last frame. */
+/* An item of the last frame, which the frame after it is made of. */
 static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
 {
     work *w = tracer->work;
     const pl_scene *scene = tracer->scene;
     pl_lazy_state *state = state_of(tracer, at->frame, query->error);
-    if (!state) return false;
+    if (!state || !grow(&w->frames, w->frame_count, &w->frame_capacity, sizeof *w->frames, query->error)) return false;
     pl_lazy_item *it = &state->items[at->item];
     bool ok = true;
-    frame f = w->frames[at->frame];
-    f.item = at->item;
-    for (uint32_t i = 0; i < it->transform_count; i++) pl_map_ray(it->transforms[i], f.o, f.d);
+    frame *f = &w->frames[w->frame_count];
+    f->item = at->item;
+    f->spanned = false;
+    f->at = at->arrived ? at->at : w->frames[at->frame].at;
+    if (!at->arrived) map_down(it, &f->at);
     if (!extend_path(w, it, query->error)) return false;
-    f.terms = w->path.length;
+    f->terms = w->path.length;
     if (it->kind == PL_NODE_ENTER) {
-        if (!pass_gate(tracer, it, &f, query, &ok) || !ok) return ok;
+        if (at->arrived && !at->open && decide(tracer, it, f, query, &ok) != PL_GATE_OPEN) return ok;
         if (it->unbounded && ++w->unknown > MOST_UNKNOWN)
             return fail_work(scene, it->what, "entered more instances of unknown size than", MOST_UNKNOWN, query->error);
-        return enter(tracer, it, &f, query);
+        return enter(tracer, it, query);
     }
     pl_leaf leaf = {.arguments = it->arguments, .primitive = UINT64_MAX, .path = write_path, .source = w};
     if (it->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[it->what];
     else leaf.shape = it->what;
     tracer->counters.primitive_tests++;
-    leaf.o = f.o;
-    leaf.d = f.d;
+    leaf.o = f->at.o;
+    leaf.d = f->at.d;
     return pl_query_leaf(query, &leaf);
 }
 
@@ -320,20 +356,22 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     static const pl_footprint none;
     work *w = tracer->work;
     pl_lazy_cache *cache = tracer->scene->structure;
-    frame root = {.stretch = 1.0, .leave = query->t_max, .spanned = true, .inside = {query->t_min, INFINITY}};
-    memcpy(root.o, ray->origin, sizeof root.o);
-    memcpy(root.d, ray->direction, sizeof root.d);
+    if (!grow(&w->frames, 0, &w->frame_capacity, sizeof *w->frames, query->error)) return false;
+    frame *root = &w->frames[0];
+    *root = (frame){.at = {.stretch = 1.0, .leave = query->t_max}, .spanned = true, .inside = {query->t_min, INFINITY}};
+    memcpy(root->at.o, ray->origin, sizeof root->at.o);
+    memcpy(root->at.d, ray->direction, sizeof root->at.d);
     w->stack_count = w->frame_count = w->path.length = w->unknown = 0;
     w->spent = w->found = 0;
     w->footprint = tracer->scene->gates ? query->footprint : none;
     w->half = pl_lazy_hold(cache);
-    bool ok = enter(tracer, NULL, &root, query);
+    bool ok = enter(tracer, NULL, query);
     for (uint64_t steps = 0; ok && w->stack_count && !query->done; steps++) {
-        pending at = w->stack[--w->stack_count];
+        const pending *at = &w->stack[--w->stack_count]; /* until something is pushed */
         if (steps > PL_LIMIT_RAY_STEPS) ok = pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
-        else if (at.t_entry > query->t_max) continue;
-        w->frame_count = at.frame + 1;
-        ok = ok && visit(tracer, &at, query);
+        else if (at->t_entry > query->t_max) continue;
+        w->frame_count = at->frame + 1;
+        ok = ok && visit(tracer, at, query);
     }
     pl_lazy_release(cache, w->half);
     pl_lazy_add_found(cache, w->found);

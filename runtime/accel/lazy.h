@@ -27,9 +27,9 @@ typedef struct pl_lazy_state pl_lazy_state;
 
 /* A primitive, a mesh or an instance of a state below some transformations. */
 typedef struct pl_lazy_item {
-    float box[6]; /* lo, hi: in the state's frame */
+    float box[6]; /* lo, hi: in the state's frame, if it is `boxed` */
     uint8_t kind; /* as pl_item */
-    bool no_shadow, unbounded;
+    bool no_shadow, unbounded, boxed;
     bool whole; /* the box holds all that may be drawn; else only the primitives, but what is drawn has some of them in it */
     uint32_t what; /* of an enter item: the symbol's node */
     uint32_t transform_count, term_count;

@@ -260,18 +260,17 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder
     if (!pl_unfolder_derive(unfolder, symbol, cache->classes, &bytes, work, error)) return NULL;
     pthread_mutex_lock(&cache->lock);
     void *memory = allocate(cache, half, bytes, full);
+    cache->unfolded += memory != NULL;
     pthread_mutex_unlock(&cache->lock);
     if (!memory) {
         if (!*full) pl_fail_memory(error, "unfolding a state");
         return NULL;
     }
     state = pl_unfolder_write(unfolder, symbol, hash, memory);
+    if (once) return state;
     pthread_mutex_lock(&cache->lock);
-    cache->unfolded++;
-    if (!once) {
-        state->next = *bucket;
-        *bucket = state;
-    }
+    state->next = *bucket;
+    *bucket = state;
     pthread_mutex_unlock(&cache->lock);
     return state;
 }

@@ -12,6 +12,10 @@ enum { EVENT_WORK = 4 };
 
 enum { KNOWN_BOUNDS = 64, MOST_LIVE = 8 };
 
+/* So many items of a state have no boxes with cut-offs if they enter states: their gates are tested at once. A fork's box lets
+ * nearly nine in ten rays through to a gate, and finding it takes a tenth of unfolding; among many items boxes pay. */
+enum { MOST_UNBOXED = 4 };
+
 /* What tracing needs of a computed transformation: all before to_parent (program.h). */
 #define MAP_BYTES offsetof(pl_transform, to_parent)
 
@@ -170,11 +174,13 @@ static void bound_state(pl_unfolder *u, pl_classes *classes, draft *d)
     const bool cuts = u->scene->gates != NULL;
     d->gate = known->gate;
     d->it.unbounded = bounds->unbounded;
-    d->it.whole = bounds->unbounded || (cuts && bounds->hollow);
+    d->it.boxed = !bounds->unbounded && !(cuts && u->drafts.count < MOST_UNBOXED);
+    if (!d->it.boxed) return;
+    d->it.whole = cuts && bounds->hollow;
     d->reach = cuts ? d->gate.reach : bounds->reach;
     bring_up(u, d);
     d->box = bounds->box;
-    if (bounds->unbounded || pl_box_is_empty(&bounds->box)) return;
+    if (pl_box_is_empty(&bounds->box)) return;
     d->box = d->it.whole ? pl_box_map(&d->map, &bounds->box) : pl_hull_box_under(&d->map, &bounds->hull);
 }
 
@@ -185,6 +191,7 @@ static void bound_leaf(pl_unfolder *u, draft *d)
     if (!shape) box = *pl_mesh_box(u->scene->meshes[d->it.what]);
     else if (shape->support) box = pl_shape_box(shape, d->arguments, NULL);
     d->it.unbounded = !pl_box_is_empty(&box) && !pl_box_is_finite(&box);
+    d->it.boxed = !d->it.unbounded;
     d->it.whole = true;
     d->reach = pl_reach_leaf(d->it.unbounded ? 0.0 : 1.7320508075688774 * pl_box_reach(&box));
     bring_up(u, d);
@@ -198,11 +205,12 @@ static void bound(pl_unfolder *u, pl_classes *classes, draft *d)
 {
     if (d->it.kind == PL_NODE_ENTER) bound_state(u, classes, d);
     else bound_leaf(u, d);
-    if (d->it.unbounded || pl_box_is_empty(&d->box)) return;
+    if (!d->it.boxed || pl_box_is_empty(&d->box)) return;
     d->box = widened(&d->box, d->slack);
     if (pl_box_is_finite(&d->box)) return;
     d->box = pl_box_everything();
-    d->it.unbounded = d->it.whole = true;
+    d->it.boxed = false;
+    d->it.unbounded = true;
 }
 
 /* Whether both enter states of the same bounds: then they share them. */
@@ -335,7 +343,7 @@ static void write_transforms(const pl_unfolder *u, const draft *d, cursor *c, pl
 static void write_item(const pl_unfolder *u, const draft *d, cursor *c, pl_lazy_item *it)
 {
     *it = d->it;
-    write_box(&d->box, it->box);
+    if (it->boxed) write_box(&d->box, it->box);
     write_transforms(u, d, c, it);
     it->terms = c->terms + d->term_first;
     atomic_init(&it->state, NULL);
@@ -373,7 +381,7 @@ pl_lazy_state *pl_unfolder_write(pl_unfolder *u, uint32_t symbol, uint64_t hash,
     for (uint32_t i = 0; i < state->item_count; i++) {
         const draft *d = (const draft *)u->drafts.data + i;
         write_item(u, d, &c, &state->items[i]);
-        if (!d->it.unbounded) pl_reach_join(&state->reach, &d->reach);
+        if (d->it.boxed) pl_reach_join(&state->reach, &d->reach);
     }
     return state;
 }
