@@ -82,12 +82,27 @@ static inline size_t add_transforms(const pl_transform **chain, size_t length, c
     return length + count;
 }
 
+/* A chain's room for what stands above an item and its own transformations. */
+static bool reserve_chain(pl_bvh_work *w, size_t above, const pl_item *item, pl_error *error)
+{
+    const size_t most = above + item->transform_count + 2;
+    return most <= w->chain_capacity || grow(&w->chain, most, &w->chain_capacity, sizeof *w->chain, error);
+}
+
 bool pl_bvh_chain(pl_bvh_work *w, const pl_front *front, uint32_t opened, const pl_item *item, size_t *count, pl_error *error)
 {
     size_t length = 0;
+    if (front->links) {
+        const uint8_t *links = front->links + front->opened[opened].list;
+        size_t above = strlen((const char *)links);
+        if (!reserve_chain(w, above, item, error)) return false;
+        length = add_transforms(w->chain, length, item);
+        while (above > 0) w->chain[length++] = front->maps[links[--above]];
+        *count = length;
+        return true;
+    }
     for (uint32_t at = opened;; at = front->opened[at].above) {
-        const size_t most = length + item->transform_count + 2;
-        if (most > w->chain_capacity && !grow(&w->chain, most, &w->chain_capacity, sizeof *w->chain, error)) return false;
+        if (!reserve_chain(w, length, item, error)) return false;
         length = add_transforms(w->chain, length, item);
         if (!at) break;
         item = &w->states->items[front->opened[at].item];

@@ -247,6 +247,7 @@ void pl_front_free(pl_front *front)
     free((void *)front->primitives);
     free((void *)front->instances);
     free((void *)front->opened);
+    free((void *)front->maps);
     free((void *)front->unbounded);
 }
 
@@ -288,6 +289,19 @@ static bool build_planned(const pl_scene *scene, const pl_compositions *composit
     return ok;
 }
 
+/* Lists the transformations in fronts, in what `memory` or the cache leaves: where fronts outgrow the cache, rays wait for
+ * other things. */
+static void link_fronts(const pl_scene *scene, pl_fronts *fronts)
+{
+    const size_t memory = scene->options.memory ? scene->options.memory : (size_t)cache_bytes();
+    for (uint32_t i = 0; i < fronts->count; i++) {
+        const size_t taken = scene->states.bytes + fronts->bytes;
+        const size_t bytes = taken < memory ? pl_front_link(&fronts->list[i], &scene->states, memory - taken) : 0;
+        fronts->item_bytes += bytes;
+        fronts->bytes += bytes;
+    }
+}
+
 /* As many fronts as are asked for; again with less where they became larger than planned and than `memory`. */
 bool pl_fronts_build(pl_scene *scene, pl_error *error)
 {
@@ -305,7 +319,9 @@ bool pl_fronts_build(pl_scene *scene, pl_error *error)
         if (ok) clear(fronts);
     }
     pl_compositions_free(compositions);
-    return ok && pl_states_pack(&scene->states, error);
+    if (!ok || !pl_states_pack(&scene->states, error)) return false;
+    link_fronts(scene, fronts);
+    return true;
 }
 
 void pl_fronts_destroy(pl_scene *scene)

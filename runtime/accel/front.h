@@ -11,7 +11,7 @@
  *
  *     front_pilot.c  rays -> visits      front_plan.c, front_levels.c  visits, budget -> what is opened where
  *     front_open.c   state -> items      front_tree.c  items -> nodes      front.c  all fronts
- *     front_hull.c   boxes of instances
+ *     front_hull.c   boxes of instances  front_links.c  opened nodes -> lists of transformations
  *     front_pyramid.c  many rays of the eye at once
  *
  * References (pl_ref) name a node, a primitive or an instance of a front: kind in the top 4 bits, index below. */
@@ -48,7 +48,10 @@ typedef struct pl_front_node {
 /* A state that stands opened in a front, reached by `item` (of pl_states.items). Node 0 is the front's own state. */
 typedef struct pl_opened {
     uint32_t item, parent;
-    uint32_t above; /* the nearest node above this one whose item has transformations, or 0 */
+    union {
+        uint32_t above; /* the nearest node above this one whose item has transformations, or 0 … */
+        uint32_t list;  /* … or in a front with links: which of them is the first one */
+    };
 } pl_opened;
 
 typedef struct pl_front_primitive {
@@ -99,6 +102,8 @@ typedef struct pl_front {
     const pl_front_place *places; /* of the instances, in the same memory … */
     const pl_front_fine *fine;    /* … as these are; NULL: not wanted */
     const pl_opened *opened;
+    const pl_transform *const *maps; /* its different maps, from 1 on … */
+    const uint8_t *links; /* … and, of each opened node, which ones lead there, the outermost first, then 0; NULL: no lists */
     const pl_ref *unbounded; /* without bounds: always visited */
     uint32_t unbounded_count, instance_count, opened_count, node_count;
     pl_ref root;             /* PL_NOTHING: no bounded items */
@@ -313,6 +318,12 @@ pl_box pl_front_instance_box(const pl_front_hulls *hulls, const pl_states *state
 
 /* Boxes (reordered) -> nodes, to be freed by free(), and *root. The same for any number of threads. NULL: no memory. */
 pl_front_node *pl_front_tree(pl_boxed *boxes, size_t count, uint32_t *node_count, pl_ref *root, int threads);
+
+/* --- front_links.c --- */
+
+/* Gives a front its links, where they take little beside it and no more than `room`. States must be packed. Returns their
+ * bytes; 0: it has none. */
+size_t pl_front_link(pl_front *front, const pl_states *states, size_t room);
 
 /* --- front.c --- */
 

@@ -310,7 +310,9 @@ static bool open_state(opening *o, const place *from)
     const uint32_t parent = from->parent;
     if (from->item) {
         const bool moved = parent && pl_front_item(states, list[parent].item)->transform_count;
-        list[opened] = (pl_opened){number_of(states, from->item), parent, moved ? parent : list[parent].above};
+        list[opened] = (pl_opened){.item = number_of(states, from->item),
+                                   .parent = parent,
+                                   .above = moved ? parent : list[parent].above};
     } else {
         list[opened] = (pl_opened){0};
     }

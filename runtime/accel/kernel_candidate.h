@@ -25,6 +25,12 @@ static inline __attribute__((always_inline)) void map_step(const pl_transform *t
 static inline __attribute__((always_inline)) bool map_down(pl_bvh_work *w, const pl_front *front, uint32_t opened,
                                                            const pl_item *item, double4 *o, double4 *d, pl_error *error)
 {
+    if (front->links) {
+        const uint8_t *link = front->links + front->opened[opened].list;
+        for (; *link; link++) map_step(front->maps[*link], o, d);
+        for (uint32_t i = 0; i < item->transform_count; i++) map_step(item->transforms[i], o, d);
+        return true;
+    }
     size_t count;
     if (!pl_bvh_chain(w, front, opened, item, &count, error)) return false;
     while (count > 0) map_step(w->chain[--count], o, d);

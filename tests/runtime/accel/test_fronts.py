@@ -85,6 +85,31 @@ def test_items_instruction_sets_and_memory_do_not_show(name):
         assert_same(ours, expected, f"{kilobytes} KB")
 
 
+def heaps(places: int) -> bytes:
+    """Heaps of nine things; every heap stands at a place of its own, two symbols below."""
+    row = " + ".join(f"[ trans {1.25 * i} {i % 7} 0 ] [ scale {1 + i / 100} ] Heap" for i in range(places))
+    things = " + ".join(f"[ trans 0 {0.1 * i} 0 ] [ scale 0.1 ] {('box', 'sphere')[i % 2]}" for i in range(9))
+    return compile(f"object {{ Row }} Selection Row {{ Row -> {row}; }} Selection Heap {{ Heap -> [ roty 30 ] Nine; }}"
+                   f" Selection Nine {{ Nine -> {things}; }}")  # fmt: skip
+
+
+@pytest.mark.parametrize("places", [2, 40, 400])
+def test_how_many_maps_a_front_has_does_not_show(places):
+    data = heaps(places)
+    origins, directions = rays(data, 1000, 3)
+    expected = answers(data, origins, directions, accelerator="boxes")
+    assert np.isfinite(expected["t"]).any()
+    for isa in available(data):
+        for options in ({}, {"front_items": 50}, {"front_items": ALL}):
+            assert_same(answers(data, origins, directions, isa=isa, **options), expected, (isa, options))
+    with Scene(data) as scene:
+        most = scene.statistics["scene_bytes"]
+    for memory in (most, most + 400, 2 * most):
+        assert_same(answers(data, origins, directions, memory=memory), expected, memory)
+        with Scene(data, memory=memory) as scene:
+            assert scene.statistics["scene_bytes"] <= memory
+
+
 @pytest.mark.parametrize("name", ["tree", "shading", "mirrors"])
 def test_the_picture_is_the_same(name):
     data = compile(ROOT / "scenes" / f"{name}.plsys", parameters=SCENES[name])
