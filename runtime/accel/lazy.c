@@ -169,9 +169,9 @@ static bool push_items(work *w, uint32_t index, bool gates, pl_query *query, pl_
     const pl_lazy_state *state = w->frames[index].state;
     const size_t first = w->stack_count;
     const pl_slab slab = pl_slab_of(from->o, from->d, pl_reach_slack(&state->reach, from->o));
-    if (!grow(&w->stack, w->stack_count + state->item_count, &w->stack_capacity, sizeof *w->stack, query->error)) return false;
     for (uint32_t i = 0; i < state->item_count; i++) {
         const pl_lazy_item *it = &state->items[i];
+        if (!grow(&w->stack, w->stack_count, &w->stack_capacity, sizeof *w->stack, query->error)) return false;
         pending *next = &w->stack[w->stack_count];
         bool met = true;
         if (query->shadow && it->no_shadow) continue;
