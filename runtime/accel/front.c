@@ -23,6 +23,8 @@ enum { DEFAULT_CACHE = 1 << 20, LARGE_FRONT = 1 << 14, MOST_THREADS = 64 };
 #define MOST_AT_ONCE 1.05
 /* Where fronts became too large, the next ones are planned for a little less than what would have fitted. */
 #define SHRINK 0.99
+/* While a tree is improved that takes no more than one part in so many of what is allowed. */
+#define IMPROVING_SHARE 32
 
 /* --- the budget --- */
 
@@ -104,10 +106,10 @@ static float wide_of(const pl_front_items *items)
 }
 
 /* Builds a front's tree and gives it its items; what they were listed with is freed. */
-static bool keep(pl_front *front, pl_front_items *items, int threads)
+static bool keep(pl_front *front, pl_front_items *items, int threads, bool improve)
 {
     front->wide = wide_of(items);
-    front->nodes = pl_front_tree(items->boxes, items->box_count, &front->node_count, &front->root, threads);
+    front->nodes = pl_front_tree(items->boxes, items->box_count, &front->node_count, &front->root, threads, improve);
     front->primitives = items->primitives;
     front->instances = items->instances;
     front->places = items->places;
@@ -125,7 +127,9 @@ static bool keep(pl_front *front, pl_front_items *items, int threads)
     return front->nodes != NULL;
 }
 
-static bool build_front(const pl_scene *scene, const pl_front_plan *plan, pl_front *front, int threads, pl_error *error)
+/* improve: since many rays enter it, as far as there is memory for that. */
+static bool build_front(const pl_scene *scene, const pl_front_plan *plan, pl_front *front, int threads, bool improve,
+                        pl_error *error)
 {
     const pl_front_counts *counts = &plan->counts[front->state];
     pl_front_items items;
@@ -133,7 +137,9 @@ static bool build_front(const pl_scene *scene, const pl_front_plan *plan, pl_fro
     if (counts->primitives > PL_REF_INDEX || counts->instances > PL_REF_INDEX || counts->opened > UINT32_MAX)
         return pl_fail(error, PL_ERROR_LIMIT, "memory", "a front of more than %d items", PL_REF_INDEX);
     bool ok = pl_front_open(plan, front, threads, &items, error);
-    if (ok && !keep(front, &items, threads)) ok = pl_fail_memory(error, "building the fronts");
+    const uint64_t room = scene->options.memory ? scene->options.memory / IMPROVING_SHARE : UINT64_MAX;
+    improve = improve && ok && items.box_count * PL_FRONT_IMPROVING_BYTES <= room;
+    if (ok && !keep(front, &items, threads, improve)) ok = pl_fail_memory(error, "building the fronts");
     pl_front_items_free(&items);
     return ok;
 }
@@ -162,7 +168,7 @@ static void *build_small(void *context)
     for (uint32_t i; (i = atomic_fetch_add(&t->next, 1)) < t->fronts->count && !atomic_load(&t->failed);) {
         pl_error error = {.code = PL_OK};
         if (is_large(t->plan, &t->fronts->list[i])) continue;
-        if (build_front(t->scene, t->plan, &t->fronts->list[i], 1, &error)) continue;
+        if (build_front(t->scene, t->plan, &t->fronts->list[i], 1, true, &error)) continue;
         pthread_mutex_lock(&t->lock);
         t->error = error;
         atomic_store(&t->failed, true);
@@ -178,7 +184,8 @@ static bool build_fronts(const pl_scene *scene, const pl_front_plan *plan, pl_fr
     pthread_t started[MOST_THREADS];
     int others = 0, threads = scene->threads < MOST_THREADS ? scene->threads : MOST_THREADS;
     for (uint32_t i = 0; i < fronts->count; i++)
-        if (is_large(plan, &fronts->list[i]) && !build_front(scene, plan, &fronts->list[i], threads, error)) return false;
+        if (is_large(plan, &fronts->list[i]) && !build_front(scene, plan, &fronts->list[i], threads, true, error))
+            return false;
     if (fronts->count < 2 || plan->estimate < 1e5) threads = 1;
     while (others < threads - 1 && pthread_create(&started[others], NULL, build_small, &t) == 0) others++;
     build_small(&t);
@@ -236,7 +243,7 @@ bool pl_front_make(const pl_scene *scene, pl_compositions *compositions, uint32_
     pl_front_plan *plan = single_plan(compositions, error);
     *front = (pl_front){.state = state};
     if (!plan || !pl_front_plan_single(plan, state, most, &counts, error)) return false;
-    if (!build_front(scene, plan, front, scene->threads, error)) return false;
+    if (!build_front(scene, plan, front, scene->threads, false, error)) return false;
     add_to(sums, front, &counts);
     return true;
 }

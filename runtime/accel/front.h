@@ -12,6 +12,7 @@
  *     front_pilot.c  rays -> visits      front_plan.c, front_levels.c  visits, budget -> what is opened where
  *     front_open.c   state -> items      front_tree.c  items -> nodes      front.c  all fronts
  *     front_hull.c   boxes of instances  front_links.c  opened nodes -> lists of transformations
+ *     front_improve.c, front_collapse.c  parts of front_tree.c
  *     front_pyramid.c  many rays of the eye at once
  *
  * References (pl_ref) name a node, a primitive or an instance of a front: kind in the top 4 bits, index below. */
@@ -316,8 +317,12 @@ pl_box pl_front_instance_box(const pl_front_hulls *hulls, const pl_states *state
 
 /* --- front_tree.c --- */
 
-/* Boxes (reordered) -> nodes, to be freed by free(), and *root. The same for any number of threads. NULL: no memory. */
-pl_front_node *pl_front_tree(pl_boxed *boxes, size_t count, uint32_t *node_count, pl_ref *root, int threads);
+/* What each box of a tree takes while that is improved. */
+enum { PL_FRONT_IMPROVING_BYTES = 2 * 64 };
+
+/* Boxes (reordered) -> nodes, to be freed by free(), and *root. The same for any number of threads. improve: takes three times
+ * as long, for a tree that many rays go through; large ones aren't. NULL: no memory. */
+pl_front_node *pl_front_tree(pl_boxed *boxes, size_t count, uint32_t *node_count, pl_ref *root, int threads, bool improve);
 
 /* --- front_links.c --- */
 

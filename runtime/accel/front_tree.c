@@ -2,90 +2,26 @@
  *
  * Groups of boxes are divided in two by binned areas (Wald, "On fast construction of SAH-based bounding volume hierarchies",
  * 2007). A large group becomes a node of eight by dividing the largest of its parts again and again. A group of at most
- * BLOCK boxes is divided down to single ones, and this binary tree is collapsed into the wide one of the least total area
- * (Ylitie, Karras & Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", 2017, section 3.2):
- *
- *     cost(t, 1)     = price + area(t) + best(t, 8)                 t as one node            (0: a single box)
- *     best(t, slots) = min over k of cost(left, k) + cost(right, slots - k)
- *     cost(t, slots) = min(best(t, slots), cost(t, slots - 1))      t as at most so many children
+ * BLOCK boxes is divided down to single ones, and this binary tree is collapsed into the best wide one (front_collapse.c). If
+ * it is to be improved (front_improve.c), a front of at most PART boxes is one such block.
  *
  * Groups of many boxes are parts that any thread takes; nodes are numbered when all are done, so threads don't show. */
-#include <math.h>
 #include <pthread.h>
 #include <stdint.h>
 #include <stdlib.h>
-#include <string.h>
 
-#include "front.h"
+#include "front_binary.h"
 
 enum { BINS = 16, DEEP = 64, ALL_AXES = 4096, BLOCK = 512, FEW = 8, PART = 1 << 13, TOPS = 1024, MOST_THREADS = 64 };
 
-
 /* What a node's memory costs, in average areas of the boxes that it is built over: fuller nodes, at most 2 % more visits. */
 #define MEMORY_PRICE 7.0f
-
-/* Four numbers at once, of which the fourth means nothing. */
-typedef float four __attribute__((vector_size(16)));
-typedef int32_t four_ints __attribute__((vector_size(16)));
-
-#ifdef __SSE2__
-#include <immintrin.h>
-static inline four least(four a, four b)
-{
-    return (four)_mm_min_ps((__m128)a, (__m128)b);
-}
-
-static inline four most(four a, four b)
-{
-    return (four)_mm_max_ps((__m128)a, (__m128)b);
-}
-#else
-static inline four least(four a, four b)
-{
-    four_ints less = a < b;
-    return (four)(((four_ints)a & less) | ((four_ints)b & ~less));
-}
-
-static inline four most(four a, four b)
-{
-    four_ints more = a > b;
-    return (four)(((four_ints)a & more) | ((four_ints)b & ~more));
-}
-#endif
-
-typedef struct bounds {
-    four lo, hi;
-} bounds;
 
 typedef struct group {
     pl_boxed *boxes;
     size_t count;
     bounds box, centres; /* centres: lo + hi of the boxes */
 } group;
-
-#define NOTHING ((bounds){{INFINITY, INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY, -INFINITY}})
-
-/* Without the reference that stands in the fourth number, which as a number may be slow to compute with. */
-static inline bounds bounds_of(const pl_boxed *box)
-{
-    const four_ints three = {-1, -1, -1, 0};
-    four lo, hi;
-    memcpy(&lo, box->lo, sizeof lo);
-    memcpy(&hi, box->hi, sizeof hi);
-    return (bounds){(four)((four_ints)lo & three), hi};
-}
-
-static inline void join(bounds *b, bounds other)
-{
-    b->lo = least(b->lo, other.lo);
-    b->hi = most(b->hi, other.hi);
-}
-
-static inline float area(const bounds *b)
-{
-    four size = b->hi - b->lo;
-    return size[0] >= 0.0f ? size[0] * size[1] + size[1] * size[2] + size[2] * size[0] : 0.0f;
-}
 
 static inline void add(group *g, bounds box)
 {
@@ -253,104 +189,38 @@ static void divide(const group *g, int level, group *left, group *right)
 
 /* --- small groups: a binary tree, collapsed --- */
 
-typedef struct binary {
-    bounds box;
-    float cost[PL_FRONT_WIDTH];            /* as at most 1 … 7 children */
-    uint8_t left_slots[PL_FRONT_WIDTH + 1]; /* of so many slots; 0: with fewer slots it is no worse */
-    uint32_t left, right;
-    pl_ref ref; /* of a single box; else PL_NOTHING */
-} binary;
+_Static_assert(2 * sizeof(pl_binary) == PL_FRONT_IMPROVING_BYTES, "as front.h says");
 
 typedef struct building {
     pl_front_node *nodes;
     uint32_t count;
-    binary *binary; /* 2 * BLOCK */
+    pl_binary *binary; /* 2 * BLOCK, or for the whole front */
     uint32_t binary_count;
-    float price; /* of a node's memory, as an area */
 } building;
 
-/* Costs of a binary node from those of its children. */
-static void find_costs(binary *t, const binary *left, const binary *right, float price)
-{
-    for (int slots = 2; slots <= PL_FRONT_WIDTH; slots++) {
-        float best = INFINITY;
-        int best_left = 1;
-        for (int k = 1; k < slots; k++) {
-            const float cost = left->cost[k] + right->cost[slots - k];
-            if (cost < best) {
-                best = cost;
-                best_left = k;
-            }
-        }
-        if (slots < PL_FRONT_WIDTH) t->cost[slots] = best;
-        else t->cost[1] = price + area(&t->box) + best;
-        t->left_slots[slots] = (uint8_t)best_left;
-    }
-    for (int slots = 2; slots < PL_FRONT_WIDTH; slots++)
-        if (t->cost[slots - 1] <= t->cost[slots]) {
-            t->cost[slots] = t->cost[slots - 1];
-            t->left_slots[slots] = 0;
-        }
-}
-
-static uint32_t make_binary(building *b, const group *g, int level)
+static uint32_t make_binary(building *b, const group *g, uint32_t parent, int level)
 {
     const uint32_t index = b->binary_count++;
-    binary *t = &b->binary[index];
+    pl_binary *t = &b->binary[index];
     t->box = g->box;
-    t->ref = PL_NOTHING;
-    if (g->count == 1) {
-        t->ref = g->boxes[0].ref;
-        memset(t->cost, 0, sizeof t->cost);
-        return index;
-    }
+    t->area = area(&g->box);
+    t->parent = parent;
+    t->ref = g->count == 1 ? g->boxes[0].ref : PL_NOTHING;
+    if (g->count == 1) return index;
     group left, right;
     divide(g, level, &left, &right);
-    t->left = make_binary(b, &left, level + 1);
-    t->right = make_binary(b, &right, level + 1);
-    find_costs(t, &b->binary[t->left], &b->binary[t->right], b->price);
+    t->left = make_binary(b, &left, index, level + 1);
+    t->right = make_binary(b, &right, index, level + 1);
     return index;
 }
 
-static pl_ref emit(building *b, uint32_t index);
-
-/* A binary node as at most so many children of a wide one, which has `number` so far. */
-static int emit_children(building *b, uint32_t index, int slots, pl_front_node *node, int number)
+static pl_ref build_block(building *b, const group *g, int level, bool improve)
 {
-    const binary *t = &b->binary[index];
-    while (slots > 1 && t->ref == PL_NOTHING && t->left_slots[slots] == 0) slots--;
-    if (slots == 1 || t->ref != PL_NOTHING) {
-        for (int axis = 0; axis < 3; axis++) {
-            node->planes[axis][number] = t->box.lo[axis];
-            node->planes[3 + axis][number] = t->box.hi[axis];
-        }
-        node->child[number] = t->ref != PL_NOTHING ? t->ref : emit(b, index);
-        return number + 1;
-    }
-    number = emit_children(b, t->left, t->left_slots[slots], node, number);
-    return emit_children(b, t->right, slots - t->left_slots[slots], node, number);
-}
-
-static void clear_node(pl_front_node *node)
-{
-    for (int i = 0; i < PL_FRONT_WIDTH; i++) {
-        for (int axis = 0; axis < 3; axis++) {
-            node->planes[axis][i] = INFINITY;
-            node->planes[3 + axis][i] = -INFINITY;
-        }
-        node->child[i] = PL_NOTHING;
-    }
-}
-
-static pl_ref emit(building *b, uint32_t index)
-{
-    const uint32_t place = b->count++;
-    pl_front_node *node = &b->nodes[place];
-    const binary *t = &b->binary[index];
-    clear_node(node);
-    int number = emit_children(b, t->left, t->left_slots[PL_FRONT_WIDTH], node, 0);
-    emit_children(b, t->right, PL_FRONT_WIDTH - t->left_slots[PL_FRONT_WIDTH], node, number);
-    return pl_ref_of(PL_KIND_NODE, place);
+    const float price = MEMORY_PRICE * area(&g->box) / (float)g->count;
+    b->binary_count = 0;
+    make_binary(b, g, 0, level);
+    if (improve) pl_binary_improve(b->binary, b->binary_count);
+    return pl_binary_collapse(b->binary, price, b->nodes, &b->count);
 }
 
 /* --- large groups --- */
@@ -396,11 +266,7 @@ static void set_boxes(pl_front_node *node, const group groups[], int number)
 static pl_ref build(building *b, const group *g, int level)
 {
     if (g->count == 1) return g->boxes[0].ref;
-    if (g->count <= BLOCK) {
-        b->binary_count = 0;
-        b->price = MEMORY_PRICE * area(&g->box) / (float)g->count;
-        return emit(b, make_binary(b, g, level));
-    }
+    if (g->count <= BLOCK) return build_block(b, g, level, false);
     group groups[PL_FRONT_WIDTH];
     const int number = split(g, groups, level);
     const uint32_t index = b->count++;
@@ -566,17 +432,17 @@ static pl_front_node *build_parts(const group *whole, uint32_t *count, pl_ref *r
     return nodes;
 }
 
-pl_front_node *pl_front_tree(pl_boxed *boxes, size_t count, uint32_t *node_count, pl_ref *root, int threads)
+pl_front_node *pl_front_tree(pl_boxed *boxes, size_t count, uint32_t *node_count, pl_ref *root, int threads, bool improve)
 {
     *root = PL_NOTHING;
     *node_count = 0;
     if (count == 0) return allocate(1);
     const group whole = group_of(boxes, count);
     if (count > PART) return build_parts(&whole, node_count, root, threads);
-    const size_t binary = 2 * (count < BLOCK ? count : BLOCK);
-    building b = {.nodes = allocate(count), .binary = aligned_alloc(64, (binary * sizeof *b.binary + 63) & ~(size_t)63)};
+    const size_t binary = 2 * (count < BLOCK || improve ? count : BLOCK);
+    building b = {.nodes = allocate(count), .binary = aligned_alloc(64, binary * sizeof *b.binary)};
     if (b.nodes && b.binary) {
-        *root = build(&b, &whole, 0);
+        *root = improve && count > 1 ? build_block(&b, &whole, 0, true) : build(&b, &whole, 0);
         *node_count = b.count;
         b.nodes = shrink(b.nodes, b.count);
     } else {

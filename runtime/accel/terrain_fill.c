@@ -401,7 +401,7 @@ static bool build_tree(pl_terrain *terrain, int threads)
     uint32_t count;
     if (!boxes) return false;
     for (uint64_t i = 0; i < terrain->tiles; i++) set_tile(terrain, i, &boxes[i]);
-    terrain->front.nodes = pl_front_tree(boxes, terrain->tiles, &count, &terrain->front.root, threads);
+    terrain->front.nodes = pl_front_tree(boxes, terrain->tiles, &count, &terrain->front.root, threads, false);
     free(boxes);
     if (!terrain->front.nodes) return false;
     terrain->node_bytes = count * sizeof *terrain->front.nodes;
