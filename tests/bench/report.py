@@ -101,6 +101,9 @@ class Results:
             axis.set(title=title, xlabel=x, ylabel=y)
             if logarithmic:
                 axis.set(xscale="log", yscale="log")
+                if kind == "residency":  # ratios about 1
+                    axis.yaxis.set_major_formatter("{x:g}")
+                    axis.yaxis.set_minor_formatter("{x:g}")
             else:
                 axis.set(ylim=(0, None))
                 axis.xaxis.get_major_locator().set_params(integer=True)
