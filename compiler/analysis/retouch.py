@@ -174,10 +174,18 @@ def _in_number(new: Block, leaf: syntax.Number, by: int) -> Touch | None:
     return Touch(leaf, number.text, end, by, None, number, tuple(diagnostics.items))
 
 
+def _is_text(data: bytes) -> bool:
+    """Whether the reader takes all bytes as they are: a comment may be cut within a character."""
+    try:
+        return "\0" not in data.decode()
+    except UnicodeDecodeError:
+        return False
+
+
 def _beside_tokens(facts: Facts, new: Block, low: int, high: int, put: int) -> Touch | None:
     """An edit of white space that some is left of, or in a comment up to the line's end."""
     old = facts.text
-    if IGNORE_WORD in old or IGNORE_WORD in new.data or b"/*" in new.data:
+    if IGNORE_WORD in old or IGNORE_WORD in new.data or b"/*" in new.data or not _is_text(new.data):
         return None
     line = max(old.rfind(b"\n", 0, low), old.rfind(b"\r", 0, low)) + 1
     before, changed = old[line:low], old[low:high] + new.data[low:put]

@@ -162,6 +162,18 @@ def test_letters_with_a_meaning(text, typed):
     check(project, document)
 
 
+@pytest.mark.parametrize("taken, typed", [("\u207f".encode()[:1], b""), (b"cubes", b"\0")])
+def test_a_comment_that_is_no_text_any_more_says_so(taken, typed):
+    """Half a character, a NUL byte: what a reading of it says isn't forgotten because comments mean nothing."""
+    project = Project()
+    document = project.open(None, "camera { angle 45 } // 20\u207f cubes\n".encode(), name="x")
+    assert told(project, document) == []
+    at = document.text.data.index(taken)
+    project.edit(document, at, at + len(taken), typed)
+    assert [code for _, _, code, _ in told(project, document)] == ["encoding"]
+    check(project, document)
+
+
 def test_a_letter_in_a_name_keeps_the_rest():
     project = Project()
     document = project.open(None, SCENE.encode(), name="x")
