@@ -214,19 +214,21 @@ class _Forecaster:
         if low == high:
             result.primitives, result.primitives_range = low, (low, low, high)
         else:
-            result.primitives_range = (low, self.expectation(), high)
+            result.primitives_range = (low, self.expectation(low, high), high)
 
-    def expectation(self) -> int | float | None:
+    def expectation(self, low: int | None, high: int | None) -> int | float | None:
         chances = Chances(self.graph, uniform=True)
         starts = self.starts(chances)
         found = explore(starts, chances.expand, self.max_states, self.max_depth)
         if not found.complete:
             return None
         values = expected(found)
-        if any(values[state] is None for state in starts):
+        if low is None or any(values[state] is None for state in starts):
             return None
         total = sum((times * values[state] for state, times in starts.items()), Decimal(0))
-        return float(total) if total < Decimal("1e300") else int(total)
+        expected_count = float(total) if total < Decimal("1e300") else int(total)
+        # Rounded chances may add up to less or more than 1.
+        return max(low, expected_count if high is None else min(expected_count, high))
 
     def report_certain_recursion(self, found: Exploration, starts: dict[State, int]) -> None:
         """A recursion that no draw can end."""

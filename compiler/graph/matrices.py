@@ -62,6 +62,12 @@ def is_singular(m: Matrix) -> bool:
     return not all(map(math.isfinite, (*inverse, *moved)))
 
 
+def regular_product(a: Matrix, b: Matrix) -> Matrix | None:
+    """a·b, without -0; None if it overflows, or became singular by rounding."""
+    product = tuple([value + 0.0 for value in multiply(a, b)])
+    return product if is_finite(product) and not is_singular(product) else None
+
+
 def is_finite(m: Matrix) -> bool:
     return all(map(math.isfinite, m))
 

@@ -13,6 +13,7 @@ from ..verify import verify
 from .dead import dead_parameters
 from .fold import fold
 from .identity import identity
+from .inline import inline
 from .liveness import liveness
 from .merge import merge
 from .prune import prune
@@ -27,6 +28,7 @@ PASSES: tuple[Callable[[Graph], None], ...] = (
     dead_parameters,
     unused_textures,
     identity,
+    inline,
     merge,
     prune,
     liveness,

@@ -13,7 +13,7 @@ underflow to a singular matrix.
 from __future__ import annotations
 
 from .. import graph as g
-from ..matrices import is_finite, is_singular, multiply
+from ..matrices import is_singular, regular_product
 
 
 def merge(graph: g.Graph) -> None:
@@ -23,8 +23,8 @@ def merge(graph: g.Graph) -> None:
         if i in absorbed or not isinstance(node, g.Transform) or is_singular(node.matrix):
             continue
         while isinstance(inner := graph.nodes[node.child], g.Transform) and not is_singular(inner.matrix):
-            product = tuple(value + 0.0 for value in multiply(node.matrix, inner.matrix))
-            if not is_finite(product) or is_singular(product):
+            product = regular_product(node.matrix, inner.matrix)
+            if product is None:
                 break
             absorbed.add(node.child)
             why = f"merged into {_shown(node)}, which stands before it"

@@ -166,6 +166,14 @@ def test_a_loop_that_draws_ends_with_probability_one():
     assert not result.infinite and "endless" not in codes(result)
 
 
+def test_chances_that_rounding_keeps_below_1_leave_the_expectation_within_its_bounds():
+    two, three = union(SPHERE, SPHERE), union(SPHERE, SPHERE, SPHERE)
+    never = apply("equal", rand(3), 0.5)
+    either = choose((1, rule(1, two)), (2, rule(2, two)))
+    low, expected, high = forecast_of(model([Enter("A")], A=branch(never, rule(0, three), either))).primitives_range
+    assert (low, expected, high) == (2, 2, 3)
+
+
 def test_a_branching_loop_may_have_no_finite_expectation():
     production = branch(apply("less", rand(), 0.6), rule(0, union(Enter("A"), Enter("A"))), rule(1, BOX))
     result = forecast_of(model([Enter("A")], seed=3, A=production), max_states=500)

@@ -87,9 +87,9 @@ def test_items_instruction_sets_and_memory_do_not_show(name):
 
 def heaps(places: int) -> bytes:
     """Heaps of nine things; every heap stands at a place of its own, two symbols below."""
-    row = " + ".join(f"[ trans {1.25 * i} {i % 7} 0 ] [ scale {1 + i / 100} ] Heap" for i in range(places))
+    row = " + ".join(f"[ trans {1.25 * i} {i % 7} 0 ] [ scale {1 + i / 100} ] Heap(1)" for i in range(places))
     things = " + ".join(f"[ trans 0 {0.1 * i} 0 ] [ scale 0.1 ] {('box', 'sphere')[i % 2]}" for i in range(9))
-    return compile(f"object {{ Row }} Selection Row {{ Row -> {row}; }} Selection Heap {{ Heap -> [ roty 30 ] Nine; }}"
+    return compile(f"object {{ Row }} Selection Row {{ Row -> {row}; }} Selection Heap(n) {{ if (n > 0) Heap -> [ roty 30 ] Nine; }}"
                    f" Selection Nine {{ Nine -> {things}; }}")  # fmt: skip
 
 
