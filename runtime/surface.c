@@ -74,7 +74,15 @@ static inline void map_normal_back(const pl_transform *transform, double n[3])
     for (int axis = 0; axis < 3; axis++) n[axis] /= size;
 }
 
-/* The same up all items; the copy stays in registers. */
+/* The same up a leg; the copy stays in registers. */
+static void map_up_leg(const pl_leg *leg, double normal[3])
+{
+    double n[3] = {normal[0], normal[1], normal[2]};
+    for (uint32_t i = 0; i < leg->map_count; i++) map_normal_back(leg->maps[i], n);
+    memcpy(normal, n, sizeof n);
+}
+
+/* The same up all items. */
 static void map_normal_up(const pl_items *items, double normal[3])
 {
     double n[3] = {normal[0], normal[1], normal[2]};
@@ -260,16 +268,22 @@ static int64_t innermost_texture(const pl_items *items, bool *code)
     return innermost;
 }
 
+/* The texture of a site, and whether it is all: it has neither pattern nor code. */
+static bool take_plain_texture(const pl_scene *scene, const pl_site *site, pl_surface *surface)
+{
+    const pl_node *node = &scene->program->nodes[site->texture];
+    const pl_record *record = &scene->program->records[node->as.texture.texture];
+    surface->texture = record->values;
+    surface->entries = record->entries;
+    return record->values[PL_TEXTURE_PATTERN] == PL_PATTERN_SOLID;
+}
+
 /* The texture of item `textured`, and where it has a pattern the hit point in the frame where it stands. */
 static void take_items_texture(const pl_scene *scene, const pl_ray *ray, const pl_hit *hit, const pl_items *items,
                                size_t textured, pl_surface *surface)
 {
-    const pl_node *node = &scene->program->nodes[items->list[textured]->site->texture];
-    const pl_record *record = &scene->program->records[node->as.texture.texture];
     double o[3], d[3];
-    surface->texture = record->values;
-    surface->entries = record->entries;
-    if (record->values[PL_TEXTURE_PATTERN] == PL_PATTERN_SOLID) return;
+    if (take_plain_texture(scene, items->list[textured]->site, surface)) return;
     memcpy(o, ray->origin, sizeof o);
     memcpy(d, ray->direction, sizeof d);
     for (size_t i = 0; i <= textured; i++) {
@@ -280,15 +294,20 @@ static void take_items_texture(const pl_scene *scene, const pl_ray *ray, const p
     for (int axis = 0; axis < 3; axis++) surface->pattern_point[axis] = o[axis] + hit->t * d[axis];
 }
 
+static void set_leaf(const pl_scene *scene, const pl_item *last, leaf_surface *leaf)
+{
+    leaf->arguments = last->arguments;
+    if (last->kind == PL_NODE_MESH) leaf->mesh = scene->meshes[last->what];
+    else leaf->shape = pl_shape_of(last->what);
+}
+
 /* By the items on the path. */
 static void items_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, const pl_items *items,
                           int64_t textured, pl_surface *surface)
 {
     const pl_scene *scene = tracer->scene;
-    const pl_item *last = items->list[items->count - 1];
-    leaf_surface leaf = {.arguments = last->arguments, .symbol = UINT32_MAX, .rule = -1};
-    if (last->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[last->what];
-    else leaf.shape = pl_shape_of(last->what);
+    leaf_surface leaf = {.symbol = UINT32_MAX, .rule = -1};
+    set_leaf(scene, items->list[items->count - 1], &leaf);
     begin_surface(tracer, ray, hit, surface);
     begin_normals(&leaf, hit, surface);
     map_normal_up(items, surface->normal);
@@ -301,6 +320,35 @@ static void items_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hi
     }
     if (textured >= 0) take_items_texture(scene, ray, hit, items, (size_t)textured, surface);
     finish_surface(scene, &leaf, ray, hit, surface);
+}
+
+/* By the legs of the trail, from the leaf up. false: not all is known so. */
+static bool legs_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface)
+{
+    const pl_scene *scene = tracer->scene;
+    const pl_site *texture = NULL;
+    leaf_surface leaf = {.symbol = UINT32_MAX, .rule = -1};
+    begin_surface(tracer, ray, hit, surface);
+    for (uint32_t term = hit->trail.length; term-- > 0;) {
+        const pl_leg *leg = scene->accel->leg(tracer, &hit->trail, term);
+        if (!leg) return false;
+        if (term + 1 == hit->trail.length) {
+            set_leaf(scene, leg->last, &leaf);
+            begin_normals(&leaf, hit, surface);
+        }
+        map_up_leg(leg, surface->normal);
+        if (leaf.smooth) map_up_leg(leg, surface->flat);
+        if (leaf.rule < 0) leaf.rule = leg->rule;
+        if (!leaf.depth && leg->entered) leaf.symbol = scene->states.list[leg->state].symbol;
+        leaf.depth += leg->entered;
+        if (!texture) texture = leg->texture;
+    }
+    finish_surface(scene, &leaf, ray, hit, surface);
+    if (!texture || take_plain_texture(scene, texture, surface)) return true;
+    bool code;
+    if (!scene->accel->items(scene, &hit->trail, &tracer->items)) return false;
+    take_items_texture(scene, ray, hit, &tracer->items, (size_t)innermost_texture(&tracer->items, &code), surface);
+    return true;
 }
 
 /* A cut instance by the items on its path, `told` of its state. */
@@ -326,6 +374,7 @@ bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, p
 {
     const pl_accel *accel = tracer->scene->accel;
     bool code;
+    if (accel->leg && !hit->cut_depth && legs_surface(tracer, ray, hit, surface)) return true;
     if (!accel->items) return walk_surface(tracer, ray, hit, &hit->path, false, surface, error);
     if (!accel->items(tracer->scene, &hit->trail, &tracer->items)) return pl_fail_memory(error, "shading a hit");
     if (!tracer->items.count) {

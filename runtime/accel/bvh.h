@@ -63,8 +63,12 @@ typedef struct pl_bvh_lane {
     size_t frame_capacity, stack_capacity;
 } pl_bvh_lane;
 
+/* Legs of surfaces are found once for many hits: neighbouring ones share most of theirs. A power of two. */
+enum { PL_BVH_LEGS = 1024 };
+
 typedef struct pl_bvh_work {
     const pl_states *states;
+    pl_leg *legs; /* by key; 0: none yet */
     pl_bvh_lane lanes[PL_LANES]; /* the first one for single rays, the others from when they are needed */
     const pl_transform **chain;
     size_t chain_capacity;
