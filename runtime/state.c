@@ -55,6 +55,7 @@ void *pl_states_allocate(pl_states *states, size_t bytes, pl_error *error)
     if (!block || block->used + bytes > block->size) {
         size_t size = block ? 2 * block->size : FIRST_BLOCK;
         if (size > LARGEST_BLOCK) size = LARGEST_BLOCK;
+        while (size > bytes && states->bytes + sizeof *block + size > states->limit) size /= 2;
         if (size < bytes) size = bytes;
         if (over_limit(states, size, error)) return NULL;
         struct pl_block *fresh = malloc(sizeof *fresh + size);

@@ -165,6 +165,16 @@ def test_maps_of_instances_hold_far_below_where_frames_are_magnified(shrink):
             assert_same(answers(data, origins, targets - origins, front_items=items, isa=isa), expected, (items, isa))
 
 
+@pytest.mark.parametrize("things", [1, 2, 5, 20])
+def test_small_scenes_need_no_more_memory_than_they_take(things):
+    row = " + ".join(f"[ trans {3 * i} 0 0 ] sphere" for i in range(things))
+    data = compile(f"object {{ Row }} Selection Row {{ Row -> {row}; }}")
+    with Scene(data) as scene:
+        taken = scene.statistics["scene_bytes"]
+    with Scene(data, memory=taken) as scene:
+        assert scene.statistics["scene_bytes"] <= taken
+
+
 @pytest.mark.parametrize("name, parameters", [("tree", {"order": 10}), ("tree", {"order": 16}), ("menger", {"level": 4})])
 def test_memory_is_never_exceeded(name, parameters):
     data = compile(ROOT / "scenes" / f"{name}.plsys", parameters=parameters)
