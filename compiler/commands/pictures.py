@@ -1,8 +1,8 @@
 """Pictures on disk: pixels in, an image file out.
 
 Formats that hold floats (exr, hdr, pfm, tif) get linear floats, others (png, jpg, …) 8-bit sRGB; ``linear16`` gives
-16-bit linear values, for comparison with other renderers. OpenImageIO writes all of them but the ordinary .png
-(``png.py``): it takes 36 MB, more than the whole of a process that draws a small scene. It is imported when something is
+16-bit linear values, for comparison with other renderers. OpenImageIO writes all of them but the ordinary .png: it takes
+36 MB, more than the whole of a process that draws a small scene, and Pillow 9 MB. Either is imported when something is
 written (or, by ``prepare``, while it is drawn), and NumPy for arrays only.
 
 Example::
@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING
 
 from ..export.files import written_whole
 from ..reading.diagnostics import PlsysError
-from .png import png_bytes
 
 if TYPE_CHECKING:
     import numpy as np
@@ -47,8 +46,8 @@ def stored_channel(path: str | Path, linear16: bool = False) -> str:
 def prepare(path: str | Path, channel: str) -> None:
     """Begin to import what will write ``channel`` to ``path``, beside what the caller does next: it takes as long as to
     draw a small scene."""
-    if not _is_ordinary_png(path, channel):
-        threading.Thread(target=import_module, args=("OpenImageIO",)).start()
+    module = "PIL.PngImagePlugin" if _is_ordinary_png(path, channel) else "OpenImageIO"
+    threading.Thread(target=import_module, args=(module,)).start()
 
 
 def write_picture(
@@ -84,10 +83,10 @@ def write_pixels(
 
     Raises PlsysError when the format is unknown or the file can't be written; then no file is left."""
     path = Path(path)
-    if _is_ordinary_png(path, channel):
-        _write_png(path, pixels, metadata or {})
-        return
     height, width, _ = memoryview(pixels).shape
+    if _is_ordinary_png(path, channel):
+        _write_png(path, pixels, width, height, metadata or {})
+        return
     import OpenImageIO as oiio
 
     kind, space = STORED[channel]
@@ -110,11 +109,20 @@ def _is_ordinary_png(path: str | Path, channel: str) -> bool:
     return channel == "srgb" and Path(path).suffix.lower() == ".png"
 
 
-def _write_png(path: Path, pixels: memoryview | np.ndarray, metadata: dict[str, str]) -> None:
-    """The metadata become texts, under PNG's own names where it has one, as OpenImageIO writes them."""
-    texts = {{"ImageDescription": "Description"}.get(name, name): value for name, value in metadata.items()}
+def _write_png(path: Path, pixels: memoryview | np.ndarray, width: int, height: int, metadata: dict[str, str]) -> None:
+    """8-bit sRGB. The metadata become texts, under PNG's own names where it has one, as OpenImageIO writes them."""
+    from PIL import Image, PngImagePlugin
+
+    texts = PngImagePlugin.PngInfo()
+    texts.add(b"sRGB", bytes([0]))
+    for name, value in metadata.items():
+        # Plain texts are Latin-1, which not all readers know; international ones are UTF-8.
+        add = texts.add_text if value.isascii() else texts.add_itxt
+        add({"ImageDescription": "Description"}.get(name, name), value)
+    picture = Image.frombuffer("RGB", (width, height), memoryview(pixels).cast("B"), "raw", "RGB", 0, 1)
     with written_whole(path) as temporary:
-        temporary.write_bytes(png_bytes(pixels, texts))
+        # Without a format's name: asked for one, Pillow imports all that it has.
+        picture.save(temporary, pnginfo=texts, compress_level=PNG_COMPRESSION)
 
 
 def check_format(path: str | Path) -> None:
