@@ -21,6 +21,7 @@ static void work_destroy(void *memory)
     free(w->chain);
     free(w->packets);
     free(w->packet_stack);
+    free(w->packet_lanes);
     free(w);
 }
 
@@ -66,7 +67,8 @@ bool pl_bvh_grow_packets(pl_bvh_work *w, size_t count, pl_error *error)
 
 bool pl_bvh_grow_packet_stack(pl_bvh_work *w, size_t top, pl_error *error)
 {
-    return grow(&w->packet_stack, top + 64, &w->packet_stack_capacity, sizeof *w->packet_stack, error);
+    return grow(&w->packet_stack, top + 64, &w->packet_stack_capacity, sizeof *w->packet_stack, error) &&
+           grow(&w->packet_lanes, top + 64, &w->packet_lanes_capacity, sizeof *w->packet_lanes, error);
 }
 
 /* --- candidates --- */

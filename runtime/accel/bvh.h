@@ -52,7 +52,10 @@ typedef struct pl_packet_frame {
     unsigned mapped; /* fours of rays that normative is known of */
     uint32_t instance;
     uint32_t answers; /* of the work when t_max and lanes were set last */
-    pl_beam beam;
+    bool each; /* nodes are told for each ray, by what a pl_frame has, and entries of the stack have lanes of their own … */
+    float near_base[3][PL_LANES], far_base[3][PL_LANES];
+    uint32_t near_row[3][PL_LANES];
+    pl_beam beam; /* … else for the beam of all lanes */
     pl_lanes normative;
 } pl_packet_frame;
 
@@ -74,7 +77,8 @@ typedef struct pl_bvh_work {
     size_t chain_capacity;
     pl_packet_frame *packets;
     uint64_t *packet_stack;
-    size_t packet_capacity, packet_stack_capacity;
+    uint32_t *packet_lanes; /* of its entries */
+    size_t packet_capacity, packet_stack_capacity, packet_lanes_capacity;
     uint32_t answers;    /* that a packet's queries got: as long as there are no more of them, nothing has changed */
     unsigned alone;      /* rays of a packet that go on one by one, the lowest first, its normative ray not yet told; or 0 */
     uint32_t alone_from; /* … from this frame on */

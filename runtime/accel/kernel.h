@@ -7,6 +7,7 @@
  * (front.h), so instruction sets can't show in hits. */
 #include "bvh.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -68,12 +69,16 @@ static inline double inverse_power(double x)
     return x;
 }
 
-/* t_max in the frame's own t, rounded up. */
+/* From t0 to t_max in a frame's own t, rounded up. */
+static inline float t_between(double t0, double t_max, double rate)
+{
+    const double t = (t_max - t0) * rate * (1.0 + 0x1p-20);
+    return t < 1e30 ? (t > 0.0 ? (float)t + 1e-35f : 1e-35f) : 1e30f;
+}
+
 static inline float local_t_max(const pl_frame *f, double t_max)
 {
-    if (f->blind) return 1e30f;
-    double t = (t_max - f->t0) * f->rate * (1.0 + 0x1p-20);
-    return t < 1e30 ? (t > 0.0 ? (float)t + 1e-35f : 1e-35f) : 1e30f;
+    return f->blind ? 1e30f : t_between(f->t0, t_max, f->rate);
 }
 
 /* The ray in single precision, and what the loop needs at each node. */

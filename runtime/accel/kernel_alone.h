@@ -7,7 +7,7 @@
 
 /* How the rays of a packet go on in a frame. ONE_BY_ONE: from the frame's box on; APART: each from the beginning, as it can't be
  * told in single precision yet. */
-enum course { ASTRAY, AS_BEAM, ONE_BY_ONE, APART };
+enum course { ASTRAY, TOGETHER, ONE_BY_ONE, APART };
 
 /* The normative ray of a lane that goes on alone, when it has a candidate: mapped with those of others that do. */
 static bool map_alone(pl_tracer *tracer, pl_error *error)

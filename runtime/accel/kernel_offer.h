@@ -114,6 +114,25 @@ static inline unsigned lanes_that_stay(const pl_bvh_work *w, uint32_t index, pl_
     return stay;
 }
 
+/* Evaluates a primitive of frame `index`, whose normative rays are known, for one lane and offers it to its query. */
+static bool offer_lane(pl_tracer *tracer, uint32_t index, pl_ref ref, int lane, pl_query *queries, double *t_max)
+{
+    pl_bvh_work *w = tracer->work;
+    const pl_packet_frame *f = &w->packets[index];
+    const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
+    const pl_item *item = pl_front_item(&tracer->scene->states, p->item);
+    double4 o = {f->normative.o[0][lane], f->normative.o[1][lane], f->normative.o[2][lane]};
+    double4 d = {f->normative.d[0][lane], f->normative.d[1][lane], f->normative.d[2][lane]};
+    double in_o[4], in_d[4];
+    if (!map_down(w, f->front, p->opened, item, &o, &d, queries->error)) return false;
+    *(double4 *)in_o = o;
+    *(double4 *)in_d = d;
+    wide_end();
+    if (!pl_bvh_offer(tracer, w->lanes, index, ref, item, in_o, in_d, &queries[lane])) return false;
+    t_max[lane] = queries[lane].t_max;
+    return true;
+}
+
 /* Evaluates a primitive of frame `index` for some lanes and offers it to their queries. */
 static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned lanes, pl_query *queries, double *t_max)
 {
@@ -123,8 +142,11 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
     const pl_item *item = pl_front_item(&scene->states, p->item);
     unsigned quads = quads_of(lanes);
+    /* Where rays go each their own way, most of them have a candidate sooner or later. */
+    if (!map_packet(scene, w, index, f->each ? quads_of(f->lanes) & ~f->mapped : quads, queries->error)) return false;
+    w->answers++;
+    if (!(lanes & (lanes - 1))) return offer_lane(tracer, index, ref, __builtin_ctz(lanes), queries, t_max);
     size_t count;
-    if (!map_packet(scene, w, index, quads, queries->error)) return false;
     if (!pl_bvh_chain(w, f->front, p->opened, item, &count, queries->error)) return false;
     pl_lanes rays;
     for (; quads; quads &= quads - 1) {
@@ -134,7 +156,6 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     }
     wide_end();
     tracer->counters.primitive_tests += (unsigned)__builtin_popcount(lanes);
-    w->answers++;
     const pl_bvh_place place = {w->lanes, index, ref};
     pl_leaf leaf = pl_bvh_leaf(scene, item, &place);
     for (; lanes; lanes &= lanes - 1) {

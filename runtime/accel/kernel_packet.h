@@ -1,10 +1,11 @@
 /* kernel_packet.h - the traversal of fronts by packets of PL_LANES rays that go about the same way (kernel.h has the single
  * ray's; this is part of the kernels of x86).
  *
- * In nodes a packet is one *beam*: intervals of its origins and of its directions' inverses, so that a child is met or
- * missed for all rays at once by about twice the arithmetic of one ray (interval arithmetic in packets: Boulos, Wald &
- * Shirley 2006, "Geometric and arithmetic culling methods for entire ray packets"). At instances and primitives the rays are
- * told apart, eight at a time. Where directions differ in sign, or three or fewer rays are left, these go on one by one.
+ * In nodes of the scene's front a packet is one *beam*: intervals of its origins and of its directions' inverses, so that a
+ * child is met or missed for all rays at once by about twice the arithmetic of one ray (interval arithmetic in packets:
+ * Boulos, Wald & Shirley 2006, "Geometric and arithmetic culling methods for entire ray packets"). Below it the rays have
+ * spread: nodes are told for each ray (kernel_each.h). At instances and primitives rays are told apart eight at a time.
+ * Three or fewer go on one by one.
  *
  * The same filters, wider: candidates are mapped down the path and evaluated as those of single rays are, so packets
  * can't show in hits. */
@@ -12,6 +13,7 @@
 #include "kernel_lanes.h"
 #include "kernel_offer.h"
 #include "kernel_alone.h"
+#include "kernel_each.h"
 
 /* So few go on alone. */
 enum { FEW = 3 };
@@ -121,12 +123,12 @@ static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double 
         set_t_max(f, t_max);
         f->slack = packet_slack(f, far);
     }
-    return __builtin_popcount(f->lanes) <= FEW ? ONE_BY_ONE : AS_BEAM;
+    return __builtin_popcount(f->lanes) <= FEW ? ONE_BY_ONE : TOGETHER;
 }
 
 /* --- beams --- */
 
-/* The rays of a frame's lanes become its beam. false: they don't go the same way. */
+/* The rays of a frame's lanes become its beam. false: they go different ways. */
 static inline bool look_along(pl_packet_frame *f)
 {
     pl_beam *b = &f->beam;
@@ -177,8 +179,8 @@ static inline unsigned lanes_left(const pl_query *queries, unsigned lanes)
 
 /* --- the loop --- */
 
-/* Goes into an instance: frame `index` + 1. */
-static inline void descend_lanes(pl_packet_frame *f, const pl_packet_frame *parent, const pl_front_instance *it)
+/* Some lanes go into an instance: frame `index` + 1. */
+static inline void descend_lanes(pl_packet_frame *f, const pl_packet_frame *parent, const pl_front_instance *it, unsigned lanes)
 {
     const pl_front_bounds *bounds = &parent->front->bounds;
     const pl_front_fine *fine = parent->front->fine ? &parent->front->fine[f->instance] : NULL;
@@ -196,7 +198,7 @@ static inline void descend_lanes(pl_packet_frame *f, const pl_packet_frame *pare
     f->rate = parent->rate;
     f->mapped = 0;
     for (int i = 0; i < PL_LANES; i += 4) {
-        if (!(parent->lanes >> i & 15)) continue;
+        if (!(lanes >> i & 15)) continue;
         const __m256d x = _mm256_loadu_pd(parent->o[0] + i) - it->centre[0], y = _mm256_loadu_pd(parent->o[1] + i) - it->centre[1];
         const __m256d z = _mm256_loadu_pd(parent->o[2] + i) - it->centre[2];
         const __m256d u = _mm256_loadu_pd(parent->d[0] + i), v = _mm256_loadu_pd(parent->d[1] + i), w = _mm256_loadu_pd(parent->d[2] + i);
@@ -224,23 +226,25 @@ static inline bool offer_unbounded(pl_tracer *tracer, uint32_t index, unsigned l
     return true;
 }
 
-/* Begins frame `index` of the packet, whose rays are set; false in *beams: nothing is left to be done in it. */
+/* Begins frame `index` of the packet, whose rays are set; false in *goes_on: nothing is left to be done in it. */
 static inline bool enter_lanes(pl_tracer *tracer, uint32_t index, unsigned lanes, pl_query *queries, double *t_max, bool any,
-                               bool *beams)
+                               bool *goes_on)
 {
     pl_bvh_work *w = tracer->work;
     pl_packet_frame *f = &w->packets[index];
     bool done;
-    *beams = false;
+    *goes_on = false;
+    f->lanes = lanes;
+    f->each = index > 0;
     if (f->front->unbounded_count) {
         if (!offer_unbounded(tracer, index, lanes, queries, t_max, any, &done)) return false;
         if (any) lanes = lanes_left(queries, lanes);
         if (done || !lanes) return true;
     }
     f->answers = w->answers;
-    enum course course = begin_lanes(f, lanes, t_max);
-    if (course == AS_BEAM && !look_along(f)) course = ONE_BY_ONE;
-    *beams = course == AS_BEAM;
+    const enum course course = begin_lanes(f, lanes, t_max);
+    *goes_on = course == TOGETHER;
+    if (*goes_on && (f->each = f->each || !look_along(f))) look_at_each(f);
     return course < ONE_BY_ONE || visit_one_by_one(tracer, index, f->lanes, course, queries, t_max, any);
 }
 
@@ -251,13 +255,25 @@ static inline void go_on(pl_packet_frame *f, const pl_bvh_work *w, const pl_quer
     f->answers = w->answers;
     if (any) {
         const unsigned left = lanes_left(queries, f->lanes);
-        if (left && left != f->lanes) {
+        if (!f->each && left && left != f->lanes) {
             f->lanes = left;
             look_along(f);
         }
         f->lanes = left;
     }
     set_t_max(f, t_max);
+}
+
+/* The same after a primitive was offered to some lanes only. */
+static inline void go_on_each(pl_packet_frame *f, const pl_bvh_work *w, unsigned lanes, const pl_query *queries, const double *t_max,
+                              bool any)
+{
+    f->answers = w->answers;
+    if (any) f->lanes &= ~lanes | lanes_left(queries, lanes);
+    for (; lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        f->t_max[lane] = t_between(f->t0, t_max[lane], f->rate);
+    }
 }
 
 static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, double *t_max, bool any)
@@ -269,26 +285,33 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
     uint64_t steps = 0;
     uint32_t index = 0;
     size_t top = 0;
-    bool beams;
-    if (!enter_lanes(tracer, 0, lanes, queries, t_max, any, &beams)) return false;
-    if (!beams) return true;
+    bool goes_on;
+    if (!enter_lanes(tracer, 0, lanes, queries, t_max, any, &goes_on)) return false;
+    if (!goes_on) return true;
     pl_packet_frame *f = &w->packets[0];
     uint64_t *stack = w->packet_stack;
+    uint32_t *own = w->packet_lanes;
     stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
+    own[top] = UINT32_MAX;
     stack[top++] = entry_of(0.0f, f->front->root);
     for (;;) {
         const uint64_t at = stack[--top];
         pl_ref ref = (pl_ref)at;
         if (entry_is_beyond(at, f->most)) continue;
-        if (any && !f->lanes && ref >> PL_REF_SHIFT != PL_KIND_RETURN) continue;
+        unsigned some = f->lanes;
+        if (f->each) some &= own[top] & lanes_within(f, at);
+        if (!some && ref >> PL_REF_SHIFT != PL_KIND_RETURN) continue;
         while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
-            const unsigned count = meet_beam(&f->beam, f->most, &f->front->nodes[ref], stack + top, &ref);
+            const pl_front_node *node = &f->front->nodes[ref];
+            const unsigned count = f->each ? meet_each(f, &some, node, stack + top, own + top, &ref)
+                                           : meet_beam(&f->beam, f->most, node, stack + top, &ref);
             steps++;
             if (count == 0) goto next;
             top += count - 1;
             if (top + 16 > w->packet_stack_capacity) {
                 if (!pl_bvh_grow_packet_stack(w, top, error)) return false;
                 stack = w->packet_stack;
+                own = w->packet_lanes;
             }
         }
         const uint32_t kind = ref >> PL_REF_SHIFT;
@@ -307,11 +330,12 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
             inner->instance = w->lanes->frames[index + 1].instance = instance;
             w->lanes->frames[index + 1].front = inner->front;
             tracer->counters.instances++;
-            descend_lanes(inner, f, it);
-            if (!enter_lanes(tracer, index + 1, f->lanes, queries, t_max, any, &beams)) return false;
-            if (beams) {
+            descend_lanes(inner, f, it, some);
+            if (!enter_lanes(tracer, index + 1, some, queries, t_max, any, &goes_on)) return false;
+            if (goes_on) {
                 f = &w->packets[++index];
                 stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
+                own[top] = UINT32_MAX;
                 stack[top++] = entry_of(0.0f, f->front->root);
             } else {
                 go_on(f, w, queries, t_max, any);
@@ -321,7 +345,7 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
             const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
             if (shadow && p->item & PL_NO_SHADOW) continue;
             tracer->counters.filtered++;
-            unsigned certain = 0, found = filter_lanes(p, kind, f, f->lanes, any ? &certain : NULL);
+            unsigned certain = 0, found = filter_lanes(p, kind, f, some, any ? &certain : NULL);
             if (any) certain &= found = lanes_that_stay(w, index, ref, queries, found);
             if (!found) continue;
             for (unsigned rest = certain; rest; rest &= rest - 1) {
@@ -330,7 +354,8 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
             }
             w->answers += certain != 0;
             if (found & ~certain && !offer_lanes(tracer, index, ref, found & ~certain, queries, t_max)) return false;
-            go_on(f, w, queries, t_max, any);
+            if (f->each) go_on_each(f, w, found, queries, t_max, any);
+            else go_on(f, w, queries, t_max, any);
             if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
         }
     next:;

@@ -221,7 +221,7 @@ bool TERRAIN_PACKET(pl_tracer *tracer, const pl_terrain *terrain, const pl_ray *
     if (count >= PL_LEAST_LANES && make_packet(c.frame, &terrain->front, rays, queries, count, c.t_max)) {
         const enum course course = begin_lanes(c.frame, (1u << count) - 1, c.t_max);
         if (course == ASTRAY) goto end;
-        beams = course == AS_BEAM && look_along(c.frame);
+        beams = course == TOGETHER && look_along(c.frame);
     }
     ok = beams ? travel_as_beam(tracer, &c, w->packet_stack)
                : travel_as_stream(tracer, terrain, rays, queries, count, w->packet_stack);

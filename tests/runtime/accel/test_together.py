@@ -114,6 +114,19 @@ def test_packets_share_their_steps():
         assert isa == "scalar" or count < 0.5 * tests["scalar"]
 
 
+def test_rays_that_part_share_their_steps():
+    """Where neighbours are farther apart than branches are thick, a node is still visited once for all that come to it."""
+    data = compile(ROOT / "scenes" / "tree.plsys", parameters={"order": 12})
+    origins, directions = bundles(data, 5)
+    apart, tests = slice(3 * SIDE * SIDE, 4 * SIDE * SIDE), {}
+    for isa in available(data):
+        with Scene(data, isa=isa, threads=1, front_items=8) as scene:
+            scene.intersect(origins[apart], directions[apart])
+            tests[isa] = scene.statistics["box_tests"]
+    for isa, count in tests.items():
+        assert isa == "scalar" or count < 0.6 * tests["scalar"]
+
+
 @pytest.mark.parametrize("size", [(32, 32), (19, 13), (3, 2), (1, 1)])
 def test_pictures_are_the_same_whose_rays_go_together(size):
     """Blocks of pixels at the picture's edges are smaller; with another channel pixels come one by one."""

@@ -1,0 +1,81 @@
+/* kernel_each.h - nodes against the rays of a packet that don't go the same way (kernel_packet.h), each by itself.
+ *
+ *     meet_each(frame, &lanes, node, entries, own, &nearest)    → the children that any of these lanes meets, with their lanes
+ *
+ * A node is visited once by all rays that met its box, in the order of the nearest of them (Barringer & Akenine-Möller
+ * 2014, "Dynamic ray stream traversal"). It is loaded once, and no ray waits for its own last step: one more
+ * takes a third of what a node takes a ray alone. */
+
+/* Sets what nodes need of each lane of a frame. */
+static inline void look_at_each(pl_packet_frame *f)
+{
+    const wide slack = wide_set(f->slack);
+    for (int first = 0; first < PL_LANES; first += HALF) {
+        if (!(f->lanes >> first & 0xFF)) continue;
+#pragma GCC unroll 3
+        for (int axis = 0; axis < 3; axis++) {
+            const wide inverse = wide_load(f->inverse[axis] + first), middle = wide_load(f->origin[axis] + first) * inverse;
+            const wide toward = slack * wide_absolute(inverse);
+            const __m256i negative = _mm256_srai_epi32(_mm256_castps_si256(inverse), 31);
+            const __m256i high = _mm256_and_si256(negative, _mm256_set1_epi32(3 * PL_FRONT_WIDTH));
+            _mm256_storeu_ps(f->near_base[axis] + first, middle + toward);
+            _mm256_storeu_ps(f->far_base[axis] + first, middle - toward);
+            _mm256_storeu_si256((__m256i *)(f->near_row[axis] + first), _mm256_add_epi32(high, _mm256_set1_epi32(axis * PL_FRONT_WIDTH)));
+        }
+    }
+}
+
+/* As meet, for one lane. */
+static inline __attribute__((always_inline)) void meet_lane(const pl_packet_frame *f, int lane, const pl_front_node *node, wide *enter,
+                                                            wide *leave)
+{
+    wide near_t[3], far_t[3];
+#pragma GCC unroll 3
+    for (int axis = 0; axis < 3; axis++) {
+        const uint32_t near = f->near_row[axis][lane], far = (uint32_t)(2 * axis + 3) * PL_FRONT_WIDTH - near;
+        const wide inverse = wide_set(f->inverse[axis][lane]);
+        near_t[axis] = wide_multiply_subtract(wide_load(node->planes[0] + near), inverse, wide_set(f->near_base[axis][lane]));
+        far_t[axis] = wide_multiply_subtract(wide_load(node->planes[0] + far), inverse, wide_set(f->far_base[axis][lane]));
+    }
+    *enter = wide_max(wide_max(near_t[0], near_t[1]), wide_max(near_t[2], wide_set(0.0f)));
+    *leave = wide_min(wide_min(far_t[0], far_t[1]), wide_min(far_t[2], wide_set(f->t_max[lane])));
+}
+
+/* As meet_nearest, for each of *lanes. *lanes become those of the nearest child, own those of the entries. */
+static inline unsigned meet_each(const pl_packet_frame *f, unsigned *lanes, const pl_front_node *node, uint64_t *entries, uint32_t *own,
+                                 pl_ref *nearest)
+{
+    static const pl_ref numbers[PL_FRONT_WIDTH] = {0, 1, 2, 3, 4, 5, 6, 7};
+    _Alignas(32) uint32_t lanes_of[PL_FRONT_WIDTH];
+    wide enter, leave, first = wide_set(INFINITY), met = wide_set(0.0f);
+    if (!(*lanes & (*lanes - 1))) {
+        meet_lane(f, __builtin_ctz(*lanes), node, &enter, &leave);
+        _mm256_storeu_si256((__m256i *)own, _mm256_set1_epi32((int)*lanes));
+        return wide_order(enter, leave, node->child, entries, nearest);
+    }
+    for (unsigned rest = *lanes; rest; rest &= rest - 1) {
+        meet_lane(f, __builtin_ctz(rest), node, &enter, &leave);
+        const wide hit = _mm256_cmp_ps(enter, leave, _CMP_LE_OQ), lane = _mm256_castsi256_ps(_mm256_set1_epi32((int)(rest & -rest)));
+        first = wide_min(_mm256_blendv_ps(wide_set(INFINITY), enter, hit), first);
+        met = _mm256_or_ps(met, wide_and(hit, lane));
+    }
+    _mm256_store_ps((float *)lanes_of, met);
+    pl_ref number = 0;
+    const unsigned count = wide_order(first, wide_set(FLT_MAX), numbers, entries, &number);
+    *nearest = node->child[number];
+    *lanes = lanes_of[number];
+    for (unsigned i = 0; i + 1 < count; i++) {
+        number = (pl_ref)entries[i];
+        entries[i] ^= number ^ node->child[number];
+        own[i] = lanes_of[number];
+    }
+    return count;
+}
+
+/* The lanes whose t_max an entry doesn't lie beyond. */
+static inline unsigned lanes_within(const pl_packet_frame *f, uint64_t entry)
+{
+    const wide t = _mm256_castsi256_ps(_mm256_set1_epi32((int)(entry >> 32) & ~(PL_FRONT_WIDTH - 1)));
+    return wide_mask_of(_mm256_cmp_ps(t, wide_load(f->t_max), _CMP_LE_OQ)) |
+           wide_mask_of(_mm256_cmp_ps(t, wide_load(f->t_max + HALF), _CMP_LE_OQ)) << HALF;
+}
