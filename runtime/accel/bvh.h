@@ -67,7 +67,7 @@ typedef struct pl_bvh_lane {
 } pl_bvh_lane;
 
 /* Legs of surfaces are found once for many hits: neighbouring ones share most of theirs. A power of two. */
-enum { PL_BVH_LEGS = 1024 };
+enum { PL_BVH_LEGS = 128 };
 
 typedef struct pl_bvh_work {
     const pl_states *states;
