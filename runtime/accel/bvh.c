@@ -97,8 +97,9 @@ bool pl_bvh_chain(pl_bvh_work *w, const pl_front *front, uint32_t opened, const 
 {
     size_t length = 0;
     if (front->links) {
-        const uint8_t *links = front->links + front->opened[opened].list;
-        size_t above = strlen((const char *)links);
+        const pl_front_list list = front->opened[opened].list;
+        const uint8_t *links = front->links + list.first;
+        size_t above = list.length;
         if (!reserve_chain(w, above, item, error)) return false;
         length = add_transforms(w->chain, length, item);
         while (above > 0) w->chain[length++] = front->maps[links[--above]];

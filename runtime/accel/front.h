@@ -46,12 +46,17 @@ typedef struct pl_front_node {
     pl_ref child[PL_FRONT_WIDTH];
 } pl_front_node;
 
+/* Some of a front's links. */
+typedef struct pl_front_list {
+    uint32_t first : 24, length : 8;
+} pl_front_list;
+
 /* A state that stands opened in a front, reached by `item` (of pl_states.items). Node 0 is the front's own state. */
 typedef struct pl_opened {
     uint32_t item, parent;
     union {
         uint32_t above; /* the nearest node above this one whose item has transformations, or 0 … */
-        uint32_t list;  /* … or in a front with links: which of them is the first one */
+        pl_front_list list; /* … or in a front with links: those that lead there */
     };
 } pl_opened;
 
@@ -104,7 +109,7 @@ typedef struct pl_front {
     const pl_front_fine *fine;    /* … as these are; NULL: not wanted */
     const pl_opened *opened;
     const pl_transform *const *maps; /* its different maps, from 1 on … */
-    const uint8_t *links; /* … and, of each opened node, which ones lead there, the outermost first, then 0; NULL: no lists */
+    const uint8_t *links; /* … and which ones lead to opened nodes, the outermost first; NULL: no lists */
     const pl_ref *unbounded; /* without bounds: always visited */
     uint32_t unbounded_count, instance_count, opened_count, node_count;
     pl_ref root;             /* PL_NOTHING: no bounded items */

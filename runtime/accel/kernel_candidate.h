@@ -26,8 +26,9 @@ static inline __attribute__((always_inline)) bool map_down(pl_bvh_work *w, const
                                                            const pl_item *item, double4 *o, double4 *d, pl_error *error)
 {
     if (front->links) {
-        const uint8_t *link = front->links + front->opened[opened].list;
-        for (; *link; link++) map_step(front->maps[*link], o, d);
+        const pl_front_list list = front->opened[opened].list;
+        const uint8_t *links = front->links + list.first;
+        for (uint32_t i = 0; i < list.length; i++) map_step(front->maps[links[i]], o, d);
         for (uint32_t i = 0; i < item->transform_count; i++) map_step(item->transforms[i], o, d);
         return true;
     }
