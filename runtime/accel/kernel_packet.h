@@ -45,83 +45,83 @@ static inline void set_t_max(pl_packet_frame *f, const double *t_max)
     f->most = wide_most(most);
 }
 
-/* Single precision from double; the largest |o| (sums of axes) in some lanes. false: a ray isn't finite, or too slow or fast. */
-static inline bool narrow(pl_packet_frame *f, unsigned lanes, float *far)
+/* What single precision tells of rays that begin a frame. */
+typedef struct begun {
+    unsigned fit, met; /* lanes that are finite, neither too slow nor too fast; those that meet the box */
+    wide far, least;   /* |o| (sums of axes) of all lanes; the first t at which one meets the box; each the worse of two */
+} begun;
+
+static inline float packet_slack(const pl_packet_frame *f)
 {
-    unsigned fit = 0;
-    wide farthest = wide_set(0.0f);
-    for (int first = 0; first < PL_LANES; first += HALF) {
-        if (!(lanes >> first & 0xFF)) continue;
-        wide away = wide_set(0.0f), fast = wide_set(0.0f);
-#pragma GCC unroll 3
-        for (int axis = 0; axis < 3; axis++) {
-            const double *from = f->o[axis] + first, *along = f->d[axis] + first;
-            const wide o = wide_narrow(_mm256_loadu_pd(from), _mm256_loadu_pd(from + 4));
-            const wide d = wide_narrow(_mm256_loadu_pd(along), _mm256_loadu_pd(along + 4));
-            _mm256_storeu_ps(f->origin[axis] + first, o);
-            _mm256_storeu_ps(f->direction[axis] + first, d);
-            away += wide_absolute(o);
-            fast += wide_absolute(d);
-        }
-        const wide moves = wide_and(_mm256_cmp_ps(fast, wide_set(SLOW), _CMP_GE_OQ), _mm256_cmp_ps(fast, wide_set(FAST), _CMP_LE_OQ));
-        farthest = wide_max(wide_and(away, wide_lanes(lanes >> first & 0xFF)), farthest);
-        fit |= wide_mask_of(wide_and(moves, _mm256_cmp_ps(away, wide_set(INFINITY), _CMP_LT_OQ))) << first;
-    }
-    *far = wide_most(farthest);
-    return !(lanes & ~fit);
+    return f->error + f->front->slack_gain * f->distance + f->front->slack_base + 0x1p-19f;
 }
 
-/* Those of some lanes that meet the frame's box, and the first t at which one does. Sets inverses. */
-static inline unsigned lanes_in_box(pl_packet_frame *f, unsigned lanes, float *first_t)
+/* Brings eight rays from double precision to single and to the frame's box; sets t_max and inverses. */
+static inline __attribute__((always_inline)) void begin_half(pl_packet_frame *f, int first, unsigned lanes, const double *t_max,
+                                                            begun *all)
 {
-    const pl_front *front = f->front;
-    unsigned met = 0;
-    wide least = wide_set(INFINITY);
-    for (int first = 0; first < PL_LANES; first += HALF) {
-        if (!(lanes >> first & 0xFF)) continue;
-        wide enter = wide_set(0.0f), leave = wide_load(f->t_max + first);
+    const __m256d from = _mm256_set1_pd(f->t0), rate = _mm256_set1_pd(f->rate * (1.0 + 0x1p-20));
+    const __m256d early = (_mm256_loadu_pd(t_max + first) - from) * rate, late = (_mm256_loadu_pd(t_max + first + 4) - from) * rate;
+    const wide in = wide_lanes(lanes >> first & 0xFF), t = wide_min(wide_max(wide_narrow(early, late), wide_set(1e-35f)), wide_set(1e30f));
+    wide o[3], d[3], enter = wide_set(0.0f), leave = t;
 #pragma GCC unroll 3
-        for (int axis = 0; axis < 3; axis++) {
-            const wide inverse = wide_inverse(wide_load(f->direction[axis] + first), 1e-18f);
-            const wide middle = wide_load(f->origin[axis] + first) * inverse;
-            const wide reach = (front->half[axis] + f->slack) * wide_absolute(inverse);
-            _mm256_storeu_ps(f->inverse[axis] + first, inverse);
-            enter = wide_max(-middle - reach, enter);
-            leave = wide_min(reach - middle, leave);
-        }
-        const wide in = wide_and(_mm256_cmp_ps(enter, leave, _CMP_LE_OQ), wide_lanes(lanes >> first & 0xFF));
-        least = wide_min(_mm256_blendv_ps(least, enter, in), least);
-        met |= wide_mask_of(in) << first;
+    for (int axis = 0; axis < 3; axis++) {
+        const double *at = f->o[axis] + first, *along = f->d[axis] + first;
+        o[axis] = wide_narrow(_mm256_loadu_pd(at), _mm256_loadu_pd(at + 4));
+        d[axis] = wide_narrow(_mm256_loadu_pd(along), _mm256_loadu_pd(along + 4));
+        _mm256_storeu_ps(f->origin[axis] + first, o[axis]);
+        _mm256_storeu_ps(f->direction[axis] + first, d[axis]);
     }
-    *first_t = wide_least(least);
-    return met;
+    const wide far = wide_absolute(o[0]) + wide_absolute(o[1]) + wide_absolute(o[2]);
+    const wide fast = wide_absolute(d[0]) + wide_absolute(d[1]) + wide_absolute(d[2]);
+    const wide slack = wide_set(packet_slack(f)) + wide_set(0x1p-19f) * far;
+#pragma GCC unroll 3
+    for (int axis = 0; axis < 3; axis++) {
+        const wide inverse = wide_inverse(d[axis], 1e-18f), middle = o[axis] * inverse;
+        const wide reach = (wide_set(f->front->half[axis]) + slack) * wide_absolute(inverse);
+        _mm256_storeu_ps(f->inverse[axis] + first, inverse);
+        enter = wide_max(-middle - reach, enter);
+        leave = wide_min(reach - middle, leave);
+    }
+    _mm256_storeu_ps(f->t_max + first, t);
+    const wide moves = wide_and(_mm256_cmp_ps(fast, wide_set(SLOW), _CMP_GE_OQ), _mm256_cmp_ps(fast, wide_set(FAST), _CMP_LE_OQ));
+    const wide meets = wide_and(_mm256_cmp_ps(enter, leave, _CMP_LE_OQ), in);
+    all->fit |= wide_mask_of(wide_and(moves, _mm256_cmp_ps(far, wide_set(INFINITY), _CMP_LT_OQ))) << first;
+    all->met |= wide_mask_of(meets) << first;
+    all->far = wide_max(wide_and(far, in), all->far);
+    all->least = wide_min(_mm256_blendv_ps(all->least, enter, meets), all->least);
 }
 
-static inline float packet_slack(const pl_packet_frame *f, float far)
+static inline begun begin_box(pl_packet_frame *f, unsigned lanes, const double *t_max)
 {
-    return f->error + f->front->slack_gain * f->distance + f->front->slack_base + 0x1p-19f * (1.0f + far);
+    begun all = {0, 0, wide_set(0.0f), wide_set(INFINITY)};
+    for (int first = 0; first < PL_LANES; first += HALF)
+        if (lanes >> first & 0xFF) begin_half(f, first, lanes, t_max, &all);
+    return all;
 }
 
 /* Begins a frame with the rays f->o and f->d of some lanes: which of them meet the box, and how they go on. */
 static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double *t_max)
 {
-    float far, first_t;
     f->lanes = lanes;
     if (f->front->root == PL_NOTHING) return ASTRAY;
-    if (!narrow(f, lanes, &far)) return APART;
-    set_t_max(f, t_max);
-    f->slack = packet_slack(f, far);
+    begun all = begin_box(f, lanes, t_max);
+    if (lanes & ~all.fit) return APART;
+    float far = wide_most(all.far);
+    f->slack = packet_slack(f) + 0x1p-19f * far;
     if (!(f->slack < 1.0f)) return APART;
-    f->lanes = lanes_in_box(f, lanes, &first_t);
+    f->lanes = all.met;
     if (!f->lanes) return ASTRAY;
     if (far > FAR) { /* all go on together to where the first of them enters */
-        f->t0 += (double)first_t / f->rate;
+        const double first_t = (double)wide_least(all.least);
+        f->t0 += first_t / f->rate;
         for (int axis = 0; axis < 3; axis++)
-            for (int i = 0; i < PL_LANES; i++) f->o[axis][i] += (double)first_t * f->d[axis][i];
+            for (int i = 0; i < PL_LANES; i++) f->o[axis][i] += first_t * f->d[axis][i];
         f->error += 0x1p-49f * (f->distance + far);
-        if (!narrow(f, f->lanes, &far) || !(far <= FAR)) return APART;
-        set_t_max(f, t_max);
-        f->slack = packet_slack(f, far);
+        all = begin_box(f, f->lanes, t_max);
+        far = wide_most(all.far);
+        if (f->lanes & ~all.fit || !(far <= FAR)) return APART;
+        f->slack = packet_slack(f) + 0x1p-19f * far;
     }
     return __builtin_popcount(f->lanes) <= FEW ? ONE_BY_ONE : TOGETHER;
 }
@@ -148,6 +148,8 @@ static inline bool look_along(pl_packet_frame *f)
         b->near_row[axis] = (uint32_t)(negative ? 3 + axis : axis) * PL_FRONT_WIDTH;
         b->far_row[axis] = (uint32_t)(negative ? axis : 3 + axis) * PL_FRONT_WIDTH;
     }
+    float least;
+    span_of(f->t_max, f->lanes, &least, &f->most);
     return true;
 }
 
@@ -297,9 +299,9 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
     for (;;) {
         const uint64_t at = stack[--top];
         pl_ref ref = (pl_ref)at;
-        if (entry_is_beyond(at, f->most)) continue;
         unsigned some = f->lanes;
         if (f->each) some &= own[top] & lanes_within(f, at);
+        else if (entry_is_beyond(at, f->most)) continue;
         if (!some && ref >> PL_REF_SHIFT != PL_KIND_RETURN) continue;
         while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
             const pl_front_node *node = &f->front->nodes[ref];
