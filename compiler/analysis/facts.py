@@ -30,14 +30,23 @@ INCREMENTAL_BYTES = 8192
 
 class Name(NamedTuple):
     """An occurrence of a name of the scene. ``role`` is definition, write (a Calculation assigns it, or it is a
-    Selection's parameter), target (left of an arrow) or read. ``start`` and ``end`` are bytes in the block; ``node`` is
-    its syntax."""
+    Selection's parameter), target (left of an arrow) or read; ``node`` is its syntax. ``start`` and ``end`` are bytes in
+    the block."""
 
-    name: str
     role: str
-    start: int
-    end: int
     node: syntax.Name
+
+    @property
+    def name(self) -> str:
+        return self.node.name
+
+    @property
+    def start(self) -> int:
+        return self.node.span.start
+
+    @property
+    def end(self) -> int:
+        return self.node.span.end
 
 
 class Definition(NamedTuple):
@@ -112,13 +121,13 @@ class Facts:
         """All occurrences of names that may be the scene's own, in text order."""
         found = [name for node in self.file.definitions for name in _names_of(node)]
         return sorted(
-            {(name.start, name.end): name for name in found if name.name}.values(), key=lambda n: n.start
+            {(name.start, name.end): name for name in found if name.node.name}.values(), key=lambda n: n.start
         )
 
     @lazy_property
     def words(self) -> frozenset[str]:
         """The names that occur."""
-        return frozenset([name.name for name in self.names])
+        return frozenset([name.node.name for name in self.names])
 
     @lazy_property
     def is_broken(self) -> bool:
@@ -195,7 +204,7 @@ def _point(block: Block, offset: int) -> tuple[int, int]:
 
 
 def _occurrence(name: syntax.Name, role: str = "read") -> Name:
-    return Name(name.name, role, name.span.start, name.span.end, name)
+    return Name(role, name)
 
 
 def _names_of(node: syntax.Definition) -> Iterator[Name]:

@@ -109,9 +109,7 @@ def constant_of(scene: Scene, node: syntax.Expression) -> float | None:
     """The number that an expression of the scene stands for; None if it isn't a constant."""
     if isinstance(node, syntax.Number):
         return node.value
-    expressions = BlockResolver(
-        node.span.source, Diagnostics(), scene.entries, lambda name, kinds: ""
-    ).expressions
+    expressions = BlockResolver(Diagnostics(), scene.entries, lambda name, kinds: "").expressions
     try:
         return expressions.constant(node)
     except (Problem, RecursionError):

@@ -24,6 +24,9 @@ from .text import Block
 # Definitions whose value others are made of: when one changes, so may what is said about those.
 _VALUES = frozenset(("value", "input", "texture", "pigment", "finish", "color_map", "object"))
 
+# So many wrong names are remembered with what is like them.
+MOST_HINTS = 1024
+
 _VOCABULARY = {kind: NameIndex(vocabulary_names(kind)) for kind in ("primitive", "function", "constant", "colour")}
 
 
@@ -48,6 +51,7 @@ class Namespace:
         self._signatures: dict[str, object] = {}
         self._touched: dict[str, None] = {}  # names that may mean something else since the last refresh
         self._names: dict[str, NameIndex] = {}  # by kind, for names that are like a wrong one
+        self._hints: dict[tuple[str, tuple[str, ...] | None], str] = {}  # of wrong names, as long as the others stay
         self.now = 0  # counts refreshes
         self._changed: dict[str, int] = {}  # in which refresh a name came to mean something else
 
@@ -74,14 +78,32 @@ class Namespace:
 
     def learn(self, facts: Facts) -> None:
         for definition in (*facts.definitions, *facts.ghosts.values()):
-            self.definers.setdefault(definition.name, {}).setdefault(facts, []).append(definition)
-            if definition.kind == "calculation" and facts.is_broken:
-                self._unfinished.setdefault(definition.name, {})[facts] = None
-            self._touched[definition.name] = None
+            self._learn_definition(facts, definition)
         for name in facts.assigned:
             self.writers.setdefault(name.name, {}).setdefault(facts, []).append(name)
             self._touched[name.name] = None
         self._learn_users(facts, facts.words)
+
+    def _learn_definition(self, facts: Facts, definition: Definition) -> None:
+        self.definers.setdefault(definition.name, {}).setdefault(facts, []).append(definition)
+        if definition.kind == "calculation" and facts.is_broken:
+            self._unfinished.setdefault(definition.name, {})[facts] = None
+        self._touched[definition.name] = None
+
+    def rename(self, facts: Facts, old: str, new: str, before: frozenset[str]) -> None:
+        """``facts``, with other words than ``before``, name what they define or assign ``new`` in one place where they named it
+        ``old``."""
+        for name in (old, new):
+            for table in (self.definers, self._unfinished, self.writers):
+                self._drop(table, name, facts)
+            self._touched[name] = None
+        for definition in facts.definitions:
+            if definition.name in (old, new):
+                self._learn_definition(facts, definition)
+        for each in facts.assigned:
+            if each.name in (old, new):
+                self.writers.setdefault(each.name, {}).setdefault(facts, []).append(each)
+        self.learn_uses(facts, before)
 
     def _learn_users(self, facts: Facts, words: Iterable[str]) -> None:
         users = self.users
@@ -93,9 +115,11 @@ class Namespace:
 
     def learn_uses(self, facts: Facts, before: frozenset[str]) -> None:
         """``facts`` have other words than ``before``, but still define and assign the same names."""
-        for name in before - facts.words:
-            self._drop(self.users, name, facts)
-        self._learn_users(facts, facts.words - before)
+        words = facts.words
+        if words != before:
+            for name in before - words:
+                self._drop(self.users, name, facts)
+            self._learn_users(facts, words - before)
         self.learn_value(facts)
 
     def learn_value(self, facts: Facts, is_other: bool = False) -> None:
@@ -144,7 +168,7 @@ class Namespace:
         entry = self.entries.get(name)
         if node is None:
             if entry is not None:
-                self._names[entry.kind].remove(name)
+                self._unname(entry)
                 del self.entries[name]
         elif entry is None or entry.node is not node or entry.kind != kind:
             span = node.span if isinstance(node, syntax.Name) else node.name.span
@@ -152,8 +176,9 @@ class Namespace:
             self.entries[name] = Entry(definition, node)
             if entry is None or entry.kind != kind:
                 if entry is not None:
-                    self._names[entry.kind].remove(name)
+                    self._unname(entry)
                 self._names.setdefault(kind, NameIndex()).add(name)
+                self._hints.clear()
         else:
             entry.value, entry.failed = None, False  # the same syntax may say something else: see retouch.py
         if node is None:
@@ -165,6 +190,10 @@ class Namespace:
             return False
         self._signatures[name] = signature
         return True
+
+    def _unname(self, entry: Entry) -> None:
+        self._names[entry.kind].remove(entry.definition.name)
+        self._hints.clear()
 
     def _defining(self, name: str) -> tuple[syntax.Definition | syntax.Name | None, str]:
         """The syntax of what defines ``name`` (the first, as the compiler sees it), and its kind."""
@@ -199,10 +228,16 @@ class Namespace:
 
     def nearest(self, name: str, kinds: tuple[str, ...] | None) -> str:
         """As Names.nearest of the compiler."""
-        if kinds is None:
-            return nearest_of(name, list(self._names.values()))
-        tables = (self._names, _VOCABULARY)
-        return nearest_of(name, [table[kind] for kind in kinds for table in tables if kind in table])
+        hint = self._hints.get((name, kinds))
+        if hint is None:
+            if len(self._hints) >= MOST_HINTS:
+                self._hints.clear()
+            if kinds is None:
+                indexes = list(self._names.values())
+            else:
+                indexes = [table[kind] for kind in kinds for table in (self._names, _VOCABULARY) if kind in table]
+            hint = self._hints[name, kinds] = nearest_of(name, indexes)
+        return hint
 
 
 def _signature(node: syntax.Definition | syntax.Name, kind: str) -> object:

@@ -3,7 +3,7 @@
 Block and namespace → messages, each put to the block that it is about. It is the code that compiles scenes, so that
 an editor is told what the compiler will say.
 
-Example: ``BlockResolver(block, Router(messages), namespace.entries, namespace.nearest).run_on(facts_of(block))``
+Example: ``BlockResolver(Router(messages), namespace.entries, namespace.nearest).run_on(facts_of(block))``
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Callable
 
 from ..reading import syntax
 from ..reading.diagnostics import Diagnostic, Diagnostics
-from ..reading.model import Constant, Empty, Operand, Variants
+from ..reading.model import Calculate, Constant, Empty, Operand, Operator, Transform, Variants
 from ..reading.resolve import Resolver
 from ..reading.resolve_names import Entry
 from ..reading.source import Source, Span
@@ -25,8 +25,9 @@ Nearest = Callable[[str, tuple[str, ...] | None], str]
 
 
 # What stands for what is left out: nobody looks at what a block comes to.
-_ALWAYS = Constant(1.0)
-_NOTHING = Variants(_ALWAYS)
+_NOTHING = Variants(Constant(1.0))
+_OPERATORS: dict[str, Operator] = {"calculation": Calculate("", ()), "transformation": Transform("", ())}
+_NO_SOURCE = Source.from_text("")
 
 
 class Router(Diagnostics):
@@ -48,60 +49,53 @@ class Router(Diagnostics):
 
 
 class BlockResolver(Resolver):
-    """Resolves in the namespace ``entries``. It is made anew for each block, so that what it remembers of one doesn't
-    outlive it; values of constants stay in the entries. ``nearest`` finds names that are like a wrong one faster than
-    by comparing all of them. Where ``places`` are given, rules, guards, terms and statements with none of them in it are known to be
-    right and left out."""
+    """Resolves blocks in the namespace ``entries``, one after the other; what it remembers of one doesn't outlive it, and values
+    of constants stay in the entries. ``nearest`` finds names that are like a wrong one faster than by comparing all of
+    them."""
 
-    def __init__(
-        self, block: Source, diagnostics: Diagnostics, entries: dict[str, Entry], nearest: Nearest | None = None,
-        places: list[Span] | None = None,
-    ) -> None:  # fmt: skip
-        super().__init__(syntax.File(Span(block, 0, 0), ()), diagnostics, {}, 0.0, Source.read)
+    def __init__(self, diagnostics: Diagnostics, entries: dict[str, Entry], nearest: Nearest | None = None) -> None:
+        super().__init__(syntax.File(Span(_NO_SOURCE, 0, 0), ()), diagnostics, {}, 0.0, Source.read)
         self.names.entries = entries
+        self._places: list[Span] | None = None
         # Which entry actions run where decides no message, and the closure of all references costs too much per key.
-        self.terms.reached = lambda name: frozenset()  # type: ignore[method-assign]
-        if places is not None:
-            self._leave_out(places)
+        self.terms.leads_to = lambda name, other: True  # type: ignore[method-assign]
+        self.names.refer = lambda entry, span: None  # type: ignore[method-assign]
+        # What is wrong with an operator or an entry action is said where its own block is resolved.
+        self._own_operator, self._own_entry_action = self.operators.declared, self.terms.entry_action
+        self.terms.entry_action = lambda node: ()  # type: ignore[method-assign]
+        self.operators.declared = lambda entry: _OPERATORS[entry.kind]  # type: ignore[method-assign]
+        self._leave_out()
         if nearest is not None:
-            self._nearest, self._hints = nearest, {}
-            self.names.nearest = self._hint  # type: ignore[method-assign]
+            self.names.nearest = nearest  # type: ignore[method-assign]
 
-    def _leave_out(self, places: list[Span]) -> None:
-        production, test = self.rules._production, self.rules._test
-        term, statement = self.terms.term, self.operators._statement
+    def _leave_out(self) -> None:
+        """Let terms and statements without any of the places be skipped."""
+        terms, operators, is_right = self.terms, self.operators, self._is_right
+        term, statement = terms.term, operators._statement
 
-        def is_right(node: syntax.Node) -> bool:
-            start, end = node.span.start, node.span.end
-            for place in places:
-                if start <= place.start and place.end <= end:
-                    return False
-            return True
-
-        def whole(node: syntax.Term, owner: str) -> Operand:
-            # The first problem of a term hides others, so that all of it is looked at.
-            self.terms.term, self.operators._statement = term, statement  # type: ignore[method-assign]
+        def touched_term(node: syntax.Term, owner: str) -> Operand:
+            if (places := self._places) is None:
+                return term(node, owner)
+            if is_right(node):
+                return Empty(node.span)
+            self._places = None  # the first problem of a term hides others, so that all of it is looked at
             try:
                 return term(node, owner)
             finally:
-                leave_out()
+                self._places = places
 
-        def leave_out() -> None:
-            self.terms.term = lambda node, owner: Empty(node.span) if is_right(node) else whole(node, owner)  # type: ignore[method-assign]
-            self.operators._statement = lambda node: _NOTHING if is_right(node) else statement(node)  # type: ignore[method-assign]
+        terms.term = touched_term  # type: ignore[method-assign]
+        operators._statement = lambda node: _NOTHING if is_right(node) else statement(node)  # type: ignore[method-assign]
 
-        leave_out()
-        self.rules._test = lambda node: _ALWAYS if is_right(node) else test(node)  # type: ignore[method-assign]
-        self.rules._production = (  # type: ignore[method-assign]
-            lambda node, *rest: Empty(node.span) if is_right(node) else production(node, *rest)
-        )
-
-    def _hint(self, name: str, kinds: tuple[str, ...] | None) -> str:
-        """A wrong name that stands in several places of a block is compared with others once."""
-        key = (name, kinds)
-        if key not in self._hints:
-            self._hints[key] = self._nearest(name, kinds)
-        return self._hints[key]
+    def _is_right(self, node: syntax.Node) -> bool:
+        """Whether ``node`` is known to be right, since it has none of the places that may be wrong."""
+        if self._places is None:
+            return False
+        start, end = node.span.start, node.span.end
+        for place in self._places:
+            if start <= place.start and place.end <= end:
+                return False
+        return True
 
     def load_mesh(self, call: syntax.Call) -> int:
         """Meshes are loaded by the whole-file checks; here it is enough that the file is there."""
@@ -111,8 +105,39 @@ class BlockResolver(Resolver):
                 return 0
         return super().load_mesh(call)
 
-    def run_on(self, facts: Facts) -> None:
-        """Resolve what ``facts``' block holds."""
+    def run_on(self, facts: Facts, places: list[Span] | None = None) -> None:
+        """Resolve what ``facts``' block holds. Where ``places`` are given, all that has none of them in it is known to be right
+        and left out."""
+        self._places = places
+        try:
+            self._run_on(facts)
+        finally:
+            self.begin()
+
+    def force(self, entry: Entry) -> None:
+        node = entry.node
+        if entry.kind in _OPERATORS:
+            self._own_operator(entry)
+        elif not isinstance(node, syntax.Selection):
+            super().force(entry)
+        elif node.entry is not None and not self._is_right(node.entry):
+            self._own_entry_action(node)
+
+    def _touched_rules(self, selection: syntax.Selection) -> None:
+        """Resolve the guards and rules that have the places in them."""
+        waiting = list(selection.productions)
+        while waiting:
+            production = waiting.pop()
+            if self._is_right(production):
+                continue
+            if isinstance(production, syntax.If):
+                if not self._is_right(production.test):
+                    self.rules._test(production.test)
+                waiting += [each for each in (production.then, production.otherwise) if each is not None]
+            else:
+                self.rules._rule(production, selection, 0)
+
+    def _run_on(self, facts: Facts) -> None:
         names = self.names
         for definition in facts.definitions:
             entry = names.entries.get(definition.name)
@@ -120,7 +145,10 @@ class BlockResolver(Resolver):
                 names._define(definition.node)  # says why it isn't in the namespace
                 continue
             if isinstance(definition.node, syntax.Selection):
-                self.rules.selection(definition.node)
+                if self._places is None:
+                    self.rules.selection(definition.node)
+                else:
+                    self._touched_rules(definition.node)
             elif entry.kind == "input" and not entry.failed:
                 names.reporting(lambda: self.constant_of(entry, entry.definition.span), None)
             names.reporting(lambda: self.force(entry), None)

@@ -13,8 +13,10 @@ its syntax, and moves ``scale 2`` on by one.
 from __future__ import annotations
 
 import re
+from collections import deque
 from dataclasses import replace
 from functools import cache
+from itertools import repeat
 from typing import NamedTuple
 
 from ..reading import syntax, vocabulary
@@ -25,12 +27,14 @@ from ..reading.parse import sharpen
 from ..reading.parse_statements import FOREIGN
 from ..reading.parse_values import Reading, number_at
 from ..reading.source import Span
-from .facts import Definition, Facts, Name
+from .facts import Definition, Facts
 from .text import Block
 
 _NAME = re.compile(rb"[A-Za-z_][A-Za-z0-9_]*")
 # The grammar's token; where both alternatives fit, the first one is longer.
 _NUMBER = re.compile(rb"[0-9]+(?:\.[0-9]+)?[eE][+-][0-9]+[A-Za-z0-9_.]*|\.?[0-9][A-Za-z0-9_.]*")
+_RENAMING = frozenset(("definition", "write"))
+_IN_WORDS = frozenset(bytes((each,)) for each in b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.")
 _BLANKS = re.compile(rb"[ \t]*")
 # Statements that end in their line, strings and a comment in it apart.
 _REST = re.compile(rb'(?:[^/"\r\n]*(?:"[^"\\\r\n]*"[^/"\r\n]*)*[;{}])?[ \t]*(?://[^\r\n]*)?(?=[\r\n]|\Z)')
@@ -84,10 +88,6 @@ class Touch(NamedTuple):
     said: tuple[Diagnostic, ...] = ()
     renames: bool = False
 
-    @property
-    def places(self) -> list[Span]:
-        return [self.leaf.span] if self.leaf is not None else []
-
 
 def touch_of(old: Block, new: Block) -> Touch | None:
     """The one token that makes all the difference between ``old``, which has been read, and ``new``, which has taken its place;
@@ -98,12 +98,16 @@ def touch_of(old: Block, new: Block) -> Touch | None:
     if facts.ghosts or facts.includes or facts.text is not old.data:
         return None
     low, high, put = edit[1]
-    if any(low < each.span.start or each.span.end < high for each in facts.syntax):
-        return None
-    index = _name_at(facts, low, high)
-    leaf = facts.names[index].node if index is not None else _leaf_at(facts, low, high)
-    if any(leaf is None or each.span is not leaf.span for each in facts.syntax):
-        return None
+    for each in facts.syntax:
+        if low < each.span.start or each.span.end < high:
+            return None
+    leaf, index = None, None
+    if facts.text[low - 1 : low] in _IN_WORDS or facts.text[high : high + 1] in _IN_WORDS:
+        index = _name_at(facts, low, high)
+        leaf = facts.names[index].node if index is not None else _leaf_at(facts, low, high)
+    for each in facts.syntax:
+        if leaf is None or each.span is not leaf.span:
+            return None
     if leaf is None:
         return _beside_tokens(facts, new, low, high, put)
     by = len(new.data) - len(old.data)
@@ -115,8 +119,9 @@ def touch_of(old: Block, new: Block) -> Touch | None:
 def _name_at(facts: Facts, low: int, high: int) -> int | None:
     """The number of the name that the bytes from ``low`` to ``high`` are within or at an end of."""
     for index, name in enumerate(facts.names):
-        if high <= name.end:
-            return index if name.start <= low else None
+        span = name.node.span
+        if high <= span.end:
+            return index if span.start <= low else None
     return None
 
 
@@ -136,8 +141,10 @@ def _leaf_at(facts: Facts, low: int, high: int) -> syntax.Name | syntax.Number |
 
 def _ends_statements(facts: Facts, new: Block, at: int) -> bool:
     """Whether nothing that stands from the byte ``at`` on in its line goes on in the next one, where its column matters."""
-    has_columns = any(isinstance(each, _WITH_COLUMNS) for each in facts.file.definitions)
-    return not has_columns or _REST.match(new.data, at) is not None
+    for each in facts.file.definitions:
+        if isinstance(each, _WITH_COLUMNS):
+            return _REST.match(new.data, at) is not None
+    return True
 
 
 def _in_name(facts: Facts, new: Block, leaf: syntax.Name, index: int | None, by: int) -> Touch | None:
@@ -145,11 +152,11 @@ def _in_name(facts: Facts, new: Block, leaf: syntax.Name, index: int | None, by:
     match = _NAME.fullmatch(new.data, start, end + by)
     if match is None or facts.text[start:end] != leaf.name.encode() or _names_its_rules(facts, start):
         return None
-    text = match[0].decode()
-    if leaf.name in _reserved() or text in _reserved():
+    text, reserved = match[0].decode(), _reserved()
+    if leaf.name in reserved or text in reserved:
         return None
-    renames = index is not None and facts.names[index].role in ("definition", "write")
-    renames = renames or any(each is leaf for each in _heads(facts))
+    renames = index is not None and facts.names[index].role in _RENAMING
+    renames = renames or any([each is leaf for each in _heads(facts)])
     if index is not None and not _is_plain(new) and (leaf.name in _words() or text in _words()):
         index = None
     return Touch(leaf, text, end, by, index, renames=renames)
@@ -185,17 +192,20 @@ def _is_text(data: bytes) -> bool:
 def _beside_tokens(facts: Facts, new: Block, low: int, high: int, put: int) -> Touch | None:
     """An edit of white space that some is left of, or in a comment up to the line's end."""
     old = facts.text
-    if IGNORE_WORD in old or IGNORE_WORD in new.data or b"/*" in new.data or not _is_text(new.data):
-        return None
     line = max(old.rfind(b"\n", 0, low), old.rfind(b"\r", 0, low)) + 1
     before, changed = old[line:low], old[low:high] + new.data[low:put]
     if b'"' in before or not before.strip() or b"\n" in changed or b"\r" in changed:
         return None
+    is_in_comment = b"//" in before
+    if not is_in_comment and changed.strip(b" \t"):
+        return None
+    if IGNORE_WORD in old or IGNORE_WORD in new.data or b"/*" in new.data or not _is_text(new.data):
+        return None
     by = put - high
-    if b"//" in before:
+    if is_in_comment:
         return Touch(None, "", high, by)
     blanks = _BLANKS.match(old, high).end()  # type: ignore[union-attr]
-    if changed.strip(b" \t") or (blanks == high and old[low - 1] not in b" \t"):
+    if blanks == high and old[low - 1] not in b" \t":
         return None
     return Touch(None, "", blanks, by) if _ends_statements(facts, new, blanks + by) else None
 
@@ -215,7 +225,8 @@ def retouch(old: Block, new: Block, touch: Touch) -> None:
         # Which words of a scene block are the scene's depends on the others.
         facts.retouched("words", "names", "definitions", "assigned")
     else:
-        _rename(facts, touch)
+        if touch.index is not None and facts.names[touch.index].role == "definition":
+            facts.definitions[:] = [Definition(each.node.name.name, each.kind, each.node) for each in facts.definitions]
         facts.retouched(*(("words",) if is_name else ()))
     new.__dict__.update(facts=facts, before=None)
 
@@ -223,31 +234,20 @@ def retouch(old: Block, new: Block, touch: Touch) -> None:
 def _names_its_rules(facts: Facts, start: int) -> bool:
     """Whether what the first line of a Selection is depends on the name at ``start``: its own name, or one in an entry
     action."""
-    return any(
-        isinstance(each.node, syntax.Selection) and each.node.entry is not None and start < each.node.entry.span.end
-        for each in facts.definitions
-    )
+    for each in facts.definitions:
+        if isinstance(each.node, syntax.Selection) and each.node.entry is not None and start < each.node.entry.span.end:
+            return True
+    return False
 
 
 def move(facts: Facts, block: Block, end: int, by: int) -> None:
     """Let all places be those of ``block``, which has ``by`` bytes more before the byte that was at ``end``. The one place
     where spans change: nobody else has them but messages and values that are made anew."""
+    deque(map(_set_source, facts.spans, repeat(block)), 0)
+    if not by:
+        return
     for span in facts.spans:
-        _set_source(span, block)
-        if by and span.end >= end:
-            _set_end(span, span.end + by)
-            if span.start >= end:
-                _set_start(span, span.start + by)
-
-
-def _rename(facts: Facts, touch: Touch) -> None:
-    """Bring the names and definitions up to date."""
-    names, index, by, end = facts.names, touch.index, touch.by, touch.end
-    if index is not None:
-        name = names[index]
-        names[index] = Name(touch.text, name.role, name.start, name.end + by, name.node)
-        if name.role == "definition":
-            facts.definitions[:] = [Definition(each.node.name.name, each.kind, each.node) for each in facts.definitions]
-    if by:
-        first = index + 1 if index is not None else next((i for i, each in enumerate(names) if each.start >= end), len(names))
-        names[first:] = [Name(each.name, each.role, each.start + by, each.end + by, each.node) for each in names[first:]]
+        if (last := span.end) >= end:
+            _set_end(span, last + by)
+            if (first := span.start) >= end:
+                _set_start(span, first + by)

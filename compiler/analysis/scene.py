@@ -16,6 +16,7 @@ Example::
 from __future__ import annotations
 
 from itertools import count
+from operator import attrgetter
 from pathlib import Path
 from typing import Callable, Iterator
 
@@ -41,6 +42,8 @@ MANY_BLOCKS = 200
 
 # So many texts of a block are known to have been right, for what is typed to be taken back.
 RIGHT_TEXTS = 4
+
+_PLACE = attrgetter("start", "end")
 
 _SINGLE = ("camera", "background")
 
@@ -72,7 +75,7 @@ class Scene:
         self._edited: dict[Block, list[Span] | None] = {}
         self._dirty: dict[Block, list[Span] | None] = {}  # then those that use what was edited
         self._opened: dict[Block, None] = {}  # and then those of a file that was opened, from its start
-        self._router = Router(self._messages)
+        self._resolver = BlockResolver(Router(self._messages), self.entries, names.nearest)
         self._include_messages: dict[Block, list[Diagnostic]] = {}
         self._find_files()
 
@@ -132,10 +135,10 @@ class Scene:
         """Reads what is pending, with a pause after each block."""
         while self._pending:
             change, removed_includes = self._pending.take(), False
-            if self._retouch(change):
+            is_alone = self._is_alone()
+            if is_alone and self._retouch(change):
                 yield
                 continue
-            is_alone = all(len(each.scenes) == 1 for each in self.documents)
             if change.removed:
                 for block in change.added:
                     if not is_alone or not self._earlier.take(block):
@@ -171,12 +174,16 @@ class Scene:
                 self._note_change(*found)
             yield
 
+    def _is_alone(self) -> bool:
+        """Whether no other scene looks at the same files."""
+        return all([len(each.scenes) == 1 for each in self.documents])
+
     def _note_change(self, facts: Facts, name: str) -> None:
         """``name``, which is in ``facts``, means something else now."""
         block = facts.block
         if block in self._opened:
             return
-        places = [each.node.span for each in facts.names if each.name == name]
+        places = [each.node.span for each in facts.names if each.node.name == name]
         waiting = self._edited if block in self._edited else self._dirty
         if block not in waiting:
             waiting[block] = places if self._is_right_but_at(block, places) else None
@@ -194,29 +201,34 @@ class Scene:
 
     def _retouch(self, change: Change) -> bool:
         """Whether all that was typed is in one token or beside all, which has been read then."""
-        if len(change.removed) != 1 or len(change.added) != 1 or any(len(each.scenes) > 1 for each in self.documents):
+        if len(change.removed) != 1 or len(change.added) != 1:
             return False
         (old,), (new,) = change
         touch = touch_of(old, new) if new not in self._earlier else None
         if touch is None:
             return False
-        facts, was_broken, words = facts_of(old), facts_of(old).is_broken, facts_of(old).words
+        facts, leaf, names = facts_of(old), touch.leaf, self._names
+        was_broken, words, places = facts.is_broken, facts.words, [leaf.span] if leaf is not None else []
+        name = leaf.name if isinstance(leaf, syntax.Name) else None
         # Whether all else in the block is known to be right.
-        was_right = not was_broken and not self._is_waiting(old) and self._is_right_but_at(old, touch.places)
+        was_right = not was_broken and not self._is_waiting(old) and self._is_right_but_at(old, places)
         self._note_right(old)
         self._forget(old)
-        if touch.renames:
-            self._names.forget(facts)
-        retouch(old, new, touch)
-        if touch.renames:
-            self._names.learn(facts)
-        elif isinstance(touch.leaf, syntax.Name):
-            self._names.learn_uses(facts, words)
-        elif touch.leaf is not None:
-            self._names.learn_value(facts, facts.is_broken is not was_broken)
+        if touch.renames and touch.index is None:
+            names.forget(facts)
+            retouch(old, new, touch)
+            names.learn(facts)
+        else:
+            retouch(old, new, touch)
+            if touch.renames:
+                names.rename(facts, name, touch.text, words)
+            elif name is not None:
+                names.learn_uses(facts, words)
+            elif leaf is not None:
+                names.learn_value(facts, facts.is_broken is not was_broken)
         self._learn(new)
-        if not (was_right and touch.leaf is None) and not self._is_right(new):
-            self._edited[new] = touch.places if was_right else None
+        if not (was_right and leaf is None) and not self._is_right(new):
+            self._edited[new] = places if was_right else None
         return True
 
     def _note_right(self, block: Block) -> None:
@@ -270,13 +282,10 @@ class Scene:
         for definition in facts.definitions:
             # Another block that uses it may have been first, and its messages went with the old ones.
             self._names.renew(definition)
-        resolver = BlockResolver(block, self._router, self.entries, self._names.nearest, places)
         try:
-            resolver.run_on(facts)
+            self._resolver.run_on(facts, places)
         except RecursionError:
             pass  # the whole-file checks, which have more room, report it
-        finally:
-            resolver.close()
 
     # --- included files
 
@@ -343,22 +352,25 @@ class Scene:
 
     def messages(self, document: Document) -> list[Message]:
         """All messages about ``document``, in text order."""
-        order, found = document.text.order, []
+        order, start_at = document.text.order, document.text.start_at
         tables = (self._syntax, self._include_messages, self._messages, self.whole, self.general)
-        noisy, unfinished = {block for table in tables for block in table}, self._names.users_of_unfinished()
-        for index, block in sorted((order[block], block) for block in noisy if block in order):
-            base = document.text.start_at(index)
-            for table in tables:
-                said = table.get(block, ())
-                if table is self._messages and block in unfinished:
-                    said = [each for each in said if each.code != "unknown-name"]
-                found += [Message(d, base + d.span.start, base + d.span.end) for d in said]
-        # Resolving by block and the whole-file checks both look for missing files.
-        found = list({(m.start, m.diagnostic.code, m.diagnostic.message): m for m in found}.values())
-        found += self._second_ones(document)
-        ignored = self._ignores(document)
-        kept = [m for m in found if not is_ignored(m.diagnostic.code, m.diagnostic.severity, m.start, ignored)]
-        return sorted(kept, key=lambda message: (message.start, message.end))
+        unfinished = self._names.users_of_unfinished()
+        # By place: resolving by block and the whole-file checks both look for missing files.
+        places: dict[tuple[int, str, str], Message] = {}
+        for table in tables:
+            for block, said in table.items():
+                if (index := order.get(block)) is None:
+                    continue
+                base = start_at(index)
+                for each in said:
+                    if table is self._messages and each.code == "unknown-name" and block in unfinished:
+                        continue
+                    start = base + each.span.start
+                    places[start, each.code, each.message] = Message(each, start, base + each.span.end)
+        found = [*places.values(), *self._second_ones(document)]
+        if ignored := self._ignores(document):
+            found = [m for m in found if not is_ignored(m.diagnostic.code, m.diagnostic.severity, m.start, ignored)]
+        return sorted(found, key=_PLACE)
 
     def _ignores(self, document: Document) -> list[Ignore]:
         """What `plsys-ignore` comments of ``document`` say. One at the end of a block may speak of the next one."""
@@ -418,7 +430,7 @@ class Scene:
             document = self.documents[number]
             base = document.text.start_at(index)
             places += [
-                Place(document, base + each.start, base + each.end, each.role) for each in facts.names if each.name == name
+                Place(document, base + each.start, base + each.end, each.role) for each in facts.names if each.node.name == name
             ]
         return places
 

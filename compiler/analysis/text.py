@@ -169,11 +169,14 @@ class Text:
         length and nothing."""
         index = self._index_of_line(line)
         block, inside = self.blocks[index], line - self._lines[index]
-        starts = block.line_starts
-        if inside >= len(starts):
+        starts, data = block.line_starts, block.data
+        if inside + 1 < len(starts):
+            text = data[starts[inside] : starts[inside + 1]]
+        elif inside < len(starts):
+            text = data[starts[inside] :]
+        else:
             return len(self), b""
-        end = starts[inside + 1] if inside + 1 < len(starts) else len(block.data)
-        return self._starts[index] + starts[inside], block.data[starts[inside] : end].rstrip(b"\r\n")
+        return self._starts[index] + starts[inside], text.rstrip(b"\r\n")
 
     def line_start(self, line: int) -> int:
         return self.line(line)[0]
@@ -190,8 +193,9 @@ class Text:
 
     def replace(self, start: int, end: int, data: bytes) -> Change:
         """Put ``data`` in the place of the bytes from ``start`` to ``end``."""
-        start = max(0, min(start, len(self)))
-        end = max(start, min(end, len(self)))
+        size = len(self)
+        start = max(0, min(start, size))
+        end = max(start, min(end, size))
         return self._plain(start, end, data) or self._put(start, end, data)
 
     def renew(self, block: Block) -> Change:
@@ -224,9 +228,13 @@ class Text:
                 return None
         elif [piece.shape for piece in split(new)] != [shape]:
             return None
-        change = self._swap(index, new) if new != old else Change([], [])
-        if change.added:
-            _link(change, low, high, len(data))
+        if new == old:
+            return Change([], [])
+        change = self._swap(index, new)
+        if (starts := block.__dict__.get("line_starts")) is not None:
+            behind, by = bisect_right(starts, low), len(new) - len(old)
+            change.added[0].__dict__["line_starts"] = starts[:behind] + [each + by for each in starts[behind:]]
+        _link(change, low, high, len(data))
         return change
 
     def _swap(self, index: int, data: bytes) -> Change:
@@ -235,7 +243,8 @@ class Text:
         new = self.blocks[index] = Block(self.name, data, self.path, old.shape)
         new.__dict__["has_head_lines"] = old.has_head_lines
         old.__dict__["is_gone"] = True
-        self._starts.resize(index, len(data))
+        if len(data) != len(old.data):
+            self._starts.resize(index, len(data))
         if self._order is not None:
             self._order[new] = self._order.pop(old)
         return Change([old], [new])

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from .diagnostics import PlsysError
 
 if TYPE_CHECKING:
-    from tree_sitter import Language, Tree
+    from tree_sitter import Language, Parser, Tree
 
 LIBRARY = Path(__file__).resolve().parent.parent / "libgrammar.so"
 
@@ -42,12 +42,17 @@ def language() -> Language:
     return Language(new_capsule(library.tree_sitter_plsys(), b"tree_sitter.Language", None))
 
 
+@cache
+def _parser() -> Parser:
+    from tree_sitter import Parser
+
+    return Parser(language())
+
+
 def syntax_tree(data: bytes, old: Tree | None = None) -> Tree:
     """The syntax tree of ``data``, the same whether ``old`` is given or not. ``old``, the tree of an earlier text with
     ``Tree.edit`` applied for every change since, lets the parser read again only what changed."""
-    from tree_sitter import Parser
-
-    parser = Parser(language())
+    parser = _parser()
     if old is not None:
         tree = parser.parse(data, old)
         if not tree.root_node.has_error:

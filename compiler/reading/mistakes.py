@@ -142,14 +142,15 @@ def extras(reading: Reading, tree: Tree) -> None:
 
     found = QueryCursor(_directive_query()).captures(tree.root_node) if b"#" in reading.data else {}
     directives = sorted(found.get("directive", []), key=lambda node: node.start_byte)
-    # What follows a directive in its line may be its arguments.
-    rows = {reading.span(node).start_position.line: node.end_byte for node in reversed(directives)}
-    items = reading.diagnostics.items
-    items[:] = [
-        item
-        for item in items
-        if item.span.start < rows.get(item.span.start_position.line, item.span.start + 1)
-    ]
+    if directives:
+        # What follows a directive in its line may be its arguments.
+        rows = {reading.span(node).start_position.line: node.end_byte for node in reversed(directives)}
+        items = reading.diagnostics.items
+        items[:] = [
+            item
+            for item in items
+            if item.span.start < rows.get(item.span.start_position.line, item.span.start + 1)
+        ]
     for i, node in enumerate(directives):
         _directive(reading, node, i > 0)
     last = tree.root_node if b"/*" in reading.data else None

@@ -9,7 +9,7 @@ Example: ``nearest("Tre", ["Tree", "Bush"])`` is ``"did you mean 'Tree'?"``.
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right, insort
+from bisect import bisect_left, insort
 from collections.abc import Iterable, Sequence
 
 # From this number of candidates on, only the likeliest ones are compared: a comparison takes some 30 µs.
@@ -64,13 +64,14 @@ def nearest_of(name: str, indexes: Sequence[NameIndex]) -> str:
 def _a_letter_off(name: str, names: Iterable[str]) -> str | None:
     """The one of ``names`` that has a letter more than ``name``, or else one that lacks a letter: by difflib's ratio no
     other is more like a ``name`` of three letters or more, so that the others needn't be compared."""
-    size, slips = len(name), []
+    size, folded, slips = len(name), name.casefold(), []
     for other in names:
         more = len(other) - size
-        if (more == 1 and _has_one_more(name, other)) or (more == -1 and _has_one_more(other, name)):
+        if not more:
+            if other.casefold() == folded:
+                return None
+        elif (more == 1 and _has_one_more(name, other)) or (more == -1 and _has_one_more(other, name)):
             slips.append(other)
-        elif not more and other.casefold() == name.casefold():
-            return None
     return max(slips, key=lambda other: (len(other), other), default=None) if size > 2 else None
 
 
@@ -84,13 +85,21 @@ def _without_a_letter(name: str, indexes: Sequence[NameIndex]) -> str | None:
 
 
 def _has_one_more(one: str, other: str) -> bool:
-    """Whether ``other`` is ``one`` with a letter more."""
-    head = _same(one, other)
-    return one[head:] == other[head + 1 :]
+    """Whether ``other`` is ``one`` with a letter more: one half of ``one`` is as it was, and the other has that letter."""
+    while one:
+        half = len(one) // 2
+        if one[half:] == other[half + 1 :]:
+            one, other = one[:half], other[: half + 1]
+        elif one[: half + 1] == other[: half + 1]:
+            one, other = one[half + 1 :], other[half + 1 :]
+        else:
+            return False
+    return True
 
 
 def _hint(name: str, names: list[str]) -> str:
-    same = next((other for other in names if other.casefold() == name.casefold()), None)
+    folded = name.casefold()
+    same = next((other for other in names if other.casefold() == folded), None)
     if same is not None:
         return f"did you mean '{same}'?"
     best = _a_letter_off(name, names) or _most_like(name, names)
@@ -120,7 +129,7 @@ def _neighbours(name: str, ordered: list[list[str]]) -> list[str]:
     for names in ordered:
         at = bisect_left(names, name)
         before += names[max(0, at - NEIGHBOURS) : at]
-        at = bisect_right(names, name, at)
+        at += names[at : at + 1] == [name]
         after += names[at : at + NEIGHBOURS]
     return sorted(before)[-NEIGHBOURS:] + sorted(after)[:NEIGHBOURS]
 

@@ -69,7 +69,6 @@ class Resolver:
     ) -> None:
         self.file, self.diagnostics, self.parameters = file, diagnostics, parameters
         self.seed = seed
-        self.model = Model(file.span.source)
         self.names = Names(diagnostics, loader)
         self.expressions = Expressions(self.names, self.constant_of, self.seed_of)
         self.textures = Textures(self.names, self.expressions)
@@ -78,9 +77,16 @@ class Resolver:
         self.rules = Rules(self.names, self.expressions, self.terms)
         self.objects = Objects(self.names, self.expressions, self.textures, self.terms, self.add_mesh)
         self.blocks = Blocks(self.names, self.expressions, self.textures)
+        self.begin()
+
+    def begin(self) -> None:
+        """Start afresh: nothing that was found out so far is known any more."""
+        self.model = Model(self.file.span.source)
         self.settings: Values = {}
         self.mesh_files: dict[Path, int] = {}
         self.placed: dict[str, int] = {}  # how many objects place each symbol
+        for each in (self.terms, self.rules, self.objects):
+            each.begin()
 
     def run(self) -> Model:
         self.names.leads_to, self.names.has_same_edges = self.terms.leads_to, self.terms.has_same_edges

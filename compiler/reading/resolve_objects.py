@@ -74,6 +74,10 @@ class Objects:
     ) -> None:
         self.names, self.expressions, self.textures = names, expressions, textures
         self.terms, self.add_mesh = terms, add_mesh
+        self.begin()
+
+    def begin(self) -> None:
+        """Start with the objects of another scene."""
         self._sizes: dict[int, tuple[int, Operand]] = {}
 
     def object(self, block: syntax.Block) -> Operand:

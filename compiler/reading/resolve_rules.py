@@ -33,6 +33,10 @@ MAX_CASES = 10_000
 class Rules:
     def __init__(self, names: Names, expressions: Expressions, terms: Terms) -> None:
         self.names, self.expressions, self.terms = names, expressions, terms
+        self.begin()
+
+    def begin(self) -> None:
+        """Start with the rules of another scene."""
         self.rules = 0
         self._firsts: dict[str, int] = {}  # the numbers of the Selections' first rules
         self._counted: dict[int, tuple[int, Production]] = {}

@@ -52,6 +52,10 @@ class Terms:
     ) -> None:
         self.names, self.expressions, self.operators = names, expressions, operators
         self.textures, self.mesh = textures, mesh
+        self.begin()
+
+    def begin(self) -> None:
+        """Start with the Selections of another scene."""
         self._entry_actions: dict[str, tuple[Operator, ...]] = {}
         self._all_edges: dict[str, set[str]] | None = None
         self._same_edges: bool | None = None

@@ -62,7 +62,7 @@ def known(block: Block) -> list[object]:
     facts = facts_of(block)
     return [
         shown(facts.file, block),
-        [each[:4] for each in facts.names],
+        [(each.name, each.role, each.start, each.end) for each in facts.names],
         [(each.name, each.kind, shown(each.node, block)) for each in facts.definitions],
         shown(facts.assigned, block),
         [(each.code, each.message, shown(each.span, block)) for each in facts.syntax],
