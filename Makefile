@@ -22,7 +22,7 @@ test: .venv/.tests ## run all tests
 	sh tests/editors/install.sh $(BIN)/python
 	$(BIN)/python -m pytest tests
 
-stress: .venv/.tests ## the tests that try at random, for hours: 10^6 edits, 10^5 messages, scenes typed by the character
+stress: .venv/.tests ## the tests that try at random, for hours: 10^6 edits, 10^5 messages
 	PLSYS_STRESS=1 $(BIN)/python -m pytest tests/grammar/test_incremental.py tests/compiler/test_mutated.py \
 	  tests/lsp/test_editing.py tests/lsp/test_hostile.py
 

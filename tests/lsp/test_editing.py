@@ -13,7 +13,7 @@ import pytest
 from plsys.compiler.analysis import Document, Project, facts_of
 from plsys.compiler.pipeline import diagnose
 from plsys.compiler.reading.source import Source
-from stress import STRESS, rounds
+from stress import rounds
 from tests.lsp.editor import Editor
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,9 +42,10 @@ def is_broken(document: Document) -> bool:
     return any(facts_of(block).is_broken for block in document.text.blocks)
 
 
+@pytest.mark.parametrize("steps", [(1,), (1, 1, 1, 2, 30, 90)], ids=["characters", "pieces"])
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
-def test_typed_from_empty_to_whole(path):
-    """Character by character in `make stress`, else in pieces. About the blocks before the one that is typed only that is
+def test_typed_from_empty_to_whole(path, steps):
+    """Character by character, and in pieces of so many characters. About the blocks before the one that is typed only that is
     said which is true without it, or once it is whole."""
     rng = random.Random(path.stem)
     whole = path.read_bytes().decode()
@@ -53,8 +54,7 @@ def test_typed_from_empty_to_whole(path):
     document = project.open(path, b"")
     typed, boundary, true = 0, -1, []
     while typed < len(whole):
-        step = 1 if STRESS else rng.choice((1, 1, 1, 2, 30, 90))
-        piece = whole[typed : typed + step]
+        piece = whole[typed : typed + rng.choice(steps)]
         at = len(document.text)
         project.edit(document, at, at, piece.encode())
         typed += len(piece)
