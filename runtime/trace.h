@@ -61,7 +61,7 @@ bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_erro
 
 /* The same for up to PL_TRACE_MANY rays, which are traced as a packet where they go about the same way: the same hits.
  * Returns how many were traced before an error: `count` without. */
-enum { PL_TRACE_MANY = 16 };
+enum { PL_TRACE_MANY = 32 };
 unsigned pl_trace_nearest_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_hit *hits, pl_error *error);
 
 /* true: no ray from the eye in a direction between these four, going round, meets anything. false: one may. */

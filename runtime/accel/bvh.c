@@ -233,23 +233,26 @@ static bool is_alike(const pl_ray *first, const pl_ray *other, double scale)
     const double *d = first->direction, near = PL_ALIKE * (fabs(d[0]) + fabs(d[1]) + fabs(d[2]));
     for (int axis = 0; axis < 3; axis++) {
         const double along = other->direction[axis], apart = other->origin[axis] - first->origin[axis];
-        if (!(d[axis] * along > 0.0 && fabs(along - d[axis]) < near && fabs(apart) * scale < PL_ALIKE)) return false;
+        if (!(fabs(along - d[axis]) < near && fabs(apart) * scale < PL_ALIKE)) return false;
     }
     return true;
 }
 #endif
 
+/* Where not all go together, halves of them may. */
 static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
 {
     pl_bvh_many_kernel *kernel = pl_bvh_stream_scalar;
+    bool packet = false;
 #ifdef __x86_64__
     const int isa = tracer->scene->isa;
     const double scale = ((const pl_fronts *)tracer->scene->structure)->list->scale;
     /* The packets' kernel looks at all. */
-    const bool packet = count >= PL_LEAST_LANES && is_alike(rays, rays + 1, scale) && is_alike(rays, rays + count - 1, scale);
+    packet = isa != PL_ISA_SCALAR && count >= PL_LEAST_LANES && is_alike(rays, rays + 1, scale) && is_alike(rays, rays + count - 1, scale);
     if (isa != PL_ISA_SCALAR) kernel = packet ? pl_bvh_packet_avx2 : isa == PL_ISA_AVX512 ? pl_bvh_stream_avx512 : pl_bvh_stream_avx2;
 #endif
-    return kernel(tracer, rays, queries, count);
+    if (packet || count <= PL_STREAM) return kernel(tracer, rays, queries, count);
+    return trace_many(tracer, rays, queries, PL_STREAM) && trace_many(tracer, rays + PL_STREAM, queries + PL_STREAM, count - PL_STREAM);
 }
 
 static bool misses(const pl_scene *scene, const double eye[3], const double (*directions)[3])

@@ -26,6 +26,7 @@ typedef struct pl_frame {
 
 enum {
     PL_LANES = PL_TRACE_MANY,
+    PL_STREAM = 16,    /* rays that take steps in turn */
     PL_LEAST_LANES = 4 /* fewer rays don't gain from going together */
 };
 
@@ -89,8 +90,9 @@ extern pl_bvh_kernel pl_bvh_trace_scalar, pl_bvh_trace_avx2, pl_bvh_trace_avx512
 
 /* Of several rays, whether or not they go the same way. */
 typedef bool pl_bvh_many_kernel(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
-extern pl_bvh_many_kernel pl_bvh_stream_scalar, pl_bvh_stream_avx2, pl_bvh_stream_avx512;
 extern pl_bvh_many_kernel pl_bvh_packet_avx2;
+/* At most PL_STREAM. */
+extern pl_bvh_many_kernel pl_bvh_stream_scalar, pl_bvh_stream_avx2, pl_bvh_stream_avx512;
 /* Rays go well together as a packet where all directions lie about the first's, by this share of its size (sums of axes), and so
  * do the origins, by this share of half the size of what is traced. */
 #define PL_ALIKE 0.125

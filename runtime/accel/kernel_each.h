@@ -55,9 +55,10 @@ static inline unsigned meet_each(const pl_packet_frame *f, unsigned *lanes, cons
     }
     for (unsigned rest = *lanes; rest; rest &= rest - 1) {
         meet_lane(f, __builtin_ctz(rest), node, &enter, &leave);
-        const wide hit = _mm256_cmp_ps(enter, leave, _CMP_LE_OQ), lane = _mm256_castsi256_ps(_mm256_set1_epi32((int)(rest & -rest)));
-        first = wide_min(_mm256_blendv_ps(wide_set(INFINITY), enter, hit), first);
-        met = _mm256_or_ps(met, wide_and(hit, lane));
+        /* All bits set are no number, which wide_min passes over. */
+        const wide missed = _mm256_cmp_ps(enter, leave, _CMP_NLE_UQ), lane = _mm256_castsi256_ps(_mm256_set1_epi32((int)(rest & -rest)));
+        first = wide_min(_mm256_or_ps(missed, enter), first);
+        met = _mm256_or_ps(_mm256_andnot_ps(missed, lane), met);
     }
     _mm256_store_ps((float *)lanes_of, met);
     pl_ref number = 0;
@@ -76,6 +77,8 @@ static inline unsigned meet_each(const pl_packet_frame *f, unsigned *lanes, cons
 static inline unsigned lanes_within(const pl_packet_frame *f, uint64_t entry)
 {
     const wide t = _mm256_castsi256_ps(_mm256_set1_epi32((int)(entry >> 32) & ~(PL_FRONT_WIDTH - 1)));
-    return wide_mask_of(_mm256_cmp_ps(t, wide_load(f->t_max), _CMP_LE_OQ)) |
-           wide_mask_of(_mm256_cmp_ps(t, wide_load(f->t_max + HALF), _CMP_LE_OQ)) << HALF;
+    unsigned within = 0;
+    for (int first = 0; first < PL_LANES; first += HALF)
+        within |= wide_mask_of(_mm256_cmp_ps(t, wide_load(f->t_max + first), _CMP_LE_OQ)) << first;
+    return within;
 }

@@ -23,11 +23,15 @@ enum { FEW = 3 };
 /* Widens intervals by the rays of some lanes. */
 static inline void span_of(const float *values, unsigned lanes, float *least, float *most)
 {
-    const wide a = wide_load(values), b = wide_load(values + HALF);
-    const wide in_a = wide_lanes(lanes & 0xFF), in_b = wide_lanes(lanes >> HALF);
     const wide high = wide_set(INFINITY);
-    *least = wide_least(wide_min(_mm256_blendv_ps(high, a, in_a), _mm256_blendv_ps(high, b, in_b)));
-    *most = wide_most(wide_max(_mm256_blendv_ps(-high, a, in_a), _mm256_blendv_ps(-high, b, in_b)));
+    wide low = high, top = -high;
+    for (int first = 0; first < PL_LANES; first += HALF) {
+        const wide some = wide_load(values + first), in = wide_lanes(lanes >> first & 0xFF);
+        low = wide_min(_mm256_blendv_ps(high, some, in), low);
+        top = wide_max(_mm256_blendv_ps(-high, some, in), top);
+    }
+    *least = wide_least(low);
+    *most = wide_most(top);
 }
 
 /* t_max of all rays in the frame's own t; *most: of its lanes. */
@@ -393,7 +397,6 @@ static inline bool are_alike(const pl_lanes *rays, const pl_front *front)
         const four o = four_set(rays->o[axis][0]), d = four_set(rays->d[axis][0]);
         for (int i = 0; i < PL_LANES; i += 4) {
             const four along = _mm256_loadu_pd(rays->d[axis] + i), apart = _mm256_loadu_pd(rays->o[axis] + i) - o;
-            alike = _mm256_and_pd(alike, _mm256_cmp_pd(d * along, four_set(0.0), _CMP_GT_OQ));
             alike = _mm256_and_pd(alike, _mm256_cmp_pd(four_absolute(along - d), four_set(near), _CMP_LT_OQ));
             alike = _mm256_and_pd(alike, _mm256_cmp_pd(four_absolute(apart) * front->scale, four_set(PL_ALIKE), _CMP_LT_OQ));
         }
@@ -439,17 +442,21 @@ static inline bool make_packet(pl_packet_frame *f, const pl_front *front, const 
     return true;
 }
 
-/* Rays that turn out to go different ways become a stream. */
+/* Rays that turn out to go different ways become two smaller packets or a stream. */
 bool PACKET_KERNEL(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
 {
     pl_bvh_work *w = tracer->work;
     double t_max[PL_LANES];
     if (!pl_bvh_grow_packets(w, 0, queries->error) || !pl_bvh_grow_packet_stack(w, 0, queries->error)) return false;
     const pl_front *front = ((const pl_fronts *)tracer->scene->structure)->list;
-    if (!make_packet(w->packets, front, rays, queries, count, t_max)) return STREAM_KERNEL(tracer, rays, queries, count);
+    if (!make_packet(w->packets, front, rays, queries, count, t_max)) {
+        if (count <= PL_STREAM) return STREAM_KERNEL(tracer, rays, queries, count);
+        return PACKET_KERNEL(tracer, rays, queries, PL_STREAM) &&
+               PACKET_KERNEL(tracer, rays + PL_STREAM, queries + PL_STREAM, count - PL_STREAM);
+    }
     w->lanes->frames[0].front = front;
     w->lanes->frames[0].instance = 0;
-    const unsigned lanes = (1u << count) - 1;
+    const unsigned lanes = UINT32_MAX >> (32 - count);
     const bool ok = queries->kind == PL_QUERY_ANY ? visit_packet(tracer, lanes, queries, t_max, true)
                                                   : visit_packet(tracer, lanes, queries, t_max, false);
     wide_end();

@@ -6,7 +6,7 @@
 
 /* Rays under way, and what each comes to in this round: sets of rays, a bit each. */
 typedef struct crowd {
-    walk walks[PL_LANES];
+    walk walks[PL_STREAM];
     unsigned left, nodes, instances, primitives, returns;
     uint64_t steps; /* of all */
 } crowd;
@@ -16,7 +16,7 @@ typedef struct crowd {
     for (unsigned rest_ = set, i = 0; rest_ && (i = (unsigned)__builtin_ctz(rest_), true); rest_ &= rest_ - 1)
 
 /* Where the set of a reference's kind lies in the 64 bits of four sets: nodes, instances, returns, primitives. */
-_Static_assert(PL_LANES <= 16, "a set has 16 bits");
+_Static_assert(PL_STREAM <= 16, "a set has 16 bits");
 static const uint8_t SET_OF_KIND[16] = {0, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 16, 32, 48};
 
 /* Takes the next entry of each ray, which stays above the top of its stack. */

@@ -219,10 +219,13 @@ bool TERRAIN_PACKET(pl_tracer *tracer, const pl_terrain *terrain, const pl_ray *
     convoy c = {.terrain = terrain, .frame = w->packets, .rays = rays, .queries = queries};
     bool ok = true, beams = false;
     if (count >= PL_LEAST_LANES && make_packet(c.frame, &terrain->front, rays, queries, count, c.t_max)) {
-        const enum course course = begin_lanes(c.frame, (1u << count) - 1, c.t_max);
+        const enum course course = begin_lanes(c.frame, UINT32_MAX >> (32 - count), c.t_max);
         if (course == ASTRAY) goto end;
         beams = course == TOGETHER && look_along(c.frame);
     }
+    if (!beams && count > PL_STREAM)
+        return TERRAIN_PACKET(tracer, terrain, rays, queries, PL_STREAM) &&
+               TERRAIN_PACKET(tracer, terrain, rays + PL_STREAM, queries + PL_STREAM, count - PL_STREAM);
     ok = beams ? travel_as_beam(tracer, &c, w->packet_stack)
                : travel_as_stream(tracer, terrain, rays, queries, count, w->packet_stack);
 end:
