@@ -325,17 +325,17 @@ static void items_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hi
 /* By the legs of the trail, from the leaf up. false: not all is known so. */
 static bool legs_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, pl_surface *surface)
 {
+    enum { MOST = 16 };
     const pl_scene *scene = tracer->scene;
+    const uint32_t count = hit->trail.length;
     const pl_site *texture = NULL;
     leaf_surface leaf = {.symbol = UINT32_MAX, .rule = -1};
+    pl_leg legs[MOST];
+    if (count > MOST || !scene->accel->legs(tracer, &hit->trail, legs)) return false;
     begin_surface(tracer, ray, hit, surface);
-    for (uint32_t term = hit->trail.length; term-- > 0;) {
-        const pl_leg *leg = scene->accel->leg(tracer, &hit->trail, term);
-        if (!leg) return false;
-        if (term + 1 == hit->trail.length) {
-            set_leaf(scene, leg->last, &leaf);
-            begin_normals(&leaf, hit, surface);
-        }
+    set_leaf(scene, legs[count - 1].last, &leaf);
+    begin_normals(&leaf, hit, surface);
+    for (const pl_leg *leg = legs + count; leg-- > legs;) {
         map_up_leg(leg, surface->normal);
         if (leaf.smooth) map_up_leg(leg, surface->flat);
         if (leaf.rule < 0) leaf.rule = leg->rule;
@@ -374,7 +374,7 @@ bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, p
 {
     const pl_accel *accel = tracer->scene->accel;
     bool code;
-    if (accel->leg && !hit->cut_depth && legs_surface(tracer, ray, hit, surface)) return true;
+    if (accel->legs && !hit->cut_depth && legs_surface(tracer, ray, hit, surface)) return true;
     if (!accel->items) return walk_surface(tracer, ray, hit, &hit->path, false, surface, error);
     if (!accel->items(tracer->scene, &hit->trail, &tracer->items)) return pl_fail_memory(error, "shading a hit");
     if (!tracer->items.count) {

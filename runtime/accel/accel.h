@@ -86,16 +86,14 @@ bool pl_query_cut_box(pl_query *query, const pl_gate_box *box, double coverage, 
 bool pl_number_by_classes(pl_tracer *tracer, pl_classes *classes, pl_hit *hit, pl_error *error);
 
 /* What a surface needs of a leg: of the items from one place on a trail to the next. */
-enum { PL_LEG_MAPS = 15 };
 typedef struct pl_leg {
-    uint64_t key; /* the accelerator's */
-    const pl_item *last; /* NULL: not all is known so */
+    const pl_item *last;    /* NULL: not all is known so */
     const pl_site *texture; /* of the innermost item that has one; NULL: none */
     int32_t rule;           /* the innermost one, -1: none */
     uint32_t state;         /* the innermost one that is entered, UINT32_MAX: none … */
     uint32_t entered;       /* … and how many are */
     uint32_t map_count;     /* transformations but translations, which leave normals alone … */
-    const pl_transform *maps[PL_LEG_MAPS]; /* … the innermost first */
+    const pl_transform *const *maps; /* … the innermost first */
 } pl_leg;
 
 struct pl_accel {
@@ -114,8 +112,8 @@ struct pl_accel {
     bool (*misses)(const pl_scene *scene, const double eye[3], const double (*directions)[3]);
     /* The items from the scene's to the leaf's at a trail; none: there is a path. NULL: its hits have paths. false: no memory. */
     bool (*items)(const pl_scene *scene, const pl_path *trail, pl_items *items);
-    /* The leg to term `term` of a trail, until the next call; NULL: ask for the items. The function may be NULL, too. */
-    const pl_leg *(*leg)(pl_tracer *tracer, const pl_path *trail, uint32_t term);
+    /* The legs of a trail, one for each term; what they name stays until the next call. false: ask for the items. NULL: the same. */
+    bool (*legs)(pl_tracer *tracer, const pl_path *trail, pl_leg *legs);
     /* The path in union terms at a trail that has no items. false: no memory. */
     bool (*path)(const pl_scene *scene, const pl_path *trail, pl_path *path);
     /* A walk that follows such a path to its leaf stands at an enter node: it may be moved to a later one. What isn't known

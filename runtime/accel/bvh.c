@@ -28,7 +28,7 @@ static void work_destroy(void *memory)
 static void *work_create(const pl_scene *scene, pl_error *error)
 {
     pl_bvh_work *w = calloc(1, sizeof *w);
-    if (w) w->legs = calloc(PL_BVH_LEGS, sizeof *w->legs);
+    if (w) w->legs = pl_bvh_legs_create();
     if (!w || !w->legs || !pl_bvh_grow_frames(w->lanes, 0, error) || !pl_bvh_grow_stack(w->lanes, 0, error)) {
         work_destroy(w);
         pl_fail_memory(error, "preparing to trace");
@@ -172,47 +172,6 @@ static bool trail_items(const pl_scene *scene, const pl_path *trail, pl_items *i
                               pl_front_item(&scene->states, leaf->item));
 }
 
-/* Joins an item of a leg that lies above those joined before. false: there are too many transformations, or a texture has
- * code. */
-static bool join_item(pl_leg *leg, const pl_item *item)
-{
-    if (item->site->texture_code) return false;
-    if (leg->rule < 0) leg->rule = item->site->rule;
-    if (item->kind == PL_NODE_ENTER && leg->entered++ == 0) leg->state = item->what;
-    if (item->site->texture >= 0 && !leg->texture) leg->texture = item->site;
-    for (uint32_t i = item->transform_count; i-- > 0;) {
-        if (item->transforms[i]->form == PL_FORM_TRANSLATION) continue;
-        if (leg->map_count == PL_LEG_MAPS) return false;
-        leg->maps[leg->map_count++] = item->transforms[i];
-    }
-    return true;
-}
-
-static void make_leg(const pl_states *states, const pl_front *front, pl_ref ref, pl_leg *leg)
-{
-    const bool entered = ref >> PL_REF_SHIFT == PL_KIND_INSTANCE;
-    const uint32_t index = ref & PL_REF_INDEX;
-    const uint32_t item = entered ? front->places[index].item : front->primitives[index].item;
-    uint32_t at = entered ? front->places[index].opened : front->primitives[index].opened;
-    *leg = (pl_leg){.last = pl_front_item(states, item), .rule = -1, .state = UINT32_MAX};
-    bool ok = join_item(leg, leg->last);
-    for (; ok && at; at = front->opened[at].parent) ok = join_item(leg, pl_front_item(states, front->opened[at].item));
-    if (!ok) leg->last = NULL;
-}
-
-static const pl_leg *trail_leg(pl_tracer *tracer, const pl_path *trail, uint32_t term)
-{
-    const pl_bvh_work *w = tracer->work;
-    const pl_front *list = ((const pl_fronts *)tracer->scene->structure)->list, *front = list;
-    for (uint32_t i = 0; i < term; i++) front = &list[front->instances[trail->terms[i]].front & ~PL_NO_SHADOW];
-    const pl_ref ref = term + 1 < trail->length ? pl_ref_of(PL_KIND_INSTANCE, trail->terms[term]) : trail->terms[term];
-    const uint64_t key = (uint64_t)(front - list + 1) << 32 | ref;
-    pl_leg *leg = &w->legs[(key * UINT64_C(0x9E3779B97F4A7C15)) >> 32 & (PL_BVH_LEGS - 1)];
-    if (leg->key != key) make_leg(w->states, front, ref, leg);
-    leg->key = key;
-    return leg->last ? leg : NULL;
-}
-
 /* --- which kernel --- */
 
 static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
@@ -270,4 +229,4 @@ const pl_accel pl_accel_bvh = {.name = "bvh",
                                .trace_many = trace_many,
                                .misses = misses,
                                .items = trail_items,
-                               .leg = trail_leg};
+                               .legs = pl_bvh_legs_of};

@@ -67,12 +67,9 @@ typedef struct pl_bvh_lane {
     size_t frame_capacity, stack_capacity;
 } pl_bvh_lane;
 
-/* Legs of surfaces are found once for many hits: neighbouring ones share most of theirs. A power of two. */
-enum { PL_BVH_LEGS = 128 };
-
 typedef struct pl_bvh_work {
     const pl_states *states;
-    pl_leg *legs; /* by key; 0: none yet */
+    struct pl_bvh_legs *legs; /* bvh_legs.c */
     pl_bvh_lane lanes[PL_LANES]; /* the first one for single rays, the others from when they are needed */
     const pl_transform **chain;
     size_t chain_capacity;
@@ -122,6 +119,14 @@ static inline bool pl_bvh_is_left(const pl_hit *hit, const pl_frame *frames, uin
         if (hit->trail.terms[i] != frames[i + 1].instance) return false;
     return true;
 }
+
+/* --- bvh_legs.c --- */
+
+/* NULL: no memory. */
+struct pl_bvh_legs *pl_bvh_legs_create(void);
+
+/* pl_accel.legs */
+bool pl_bvh_legs_of(pl_tracer *tracer, const pl_path *trail, pl_leg *legs);
 
 /* Room for one more frame, for eight more entries above `top`; false: no memory. */
 bool pl_bvh_grow_frames(pl_bvh_lane *lane, size_t count, pl_error *error);
