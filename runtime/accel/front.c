@@ -21,6 +21,8 @@ enum { DEFAULT_CACHE = 1 << 20, LARGE_FRONT = 1 << 14, MOST_THREADS = 64 };
 /* What there may be at once while building: a process that traces takes SPARE more than its scene anyway. */
 #define SPARE (256 << 10)
 #define MOST_AT_ONCE 1.05
+/* What plans that fill `memory` leave of it for lists of transformations, where they can. */
+#define LINKS_ROOM 0.03
 /* Where fronts became too large, the next ones are planned for a little less than what would have fitted. */
 #define SHRINK 0.99
 /* While a tree is improved that takes no more than one part in so many of what is allowed. */
@@ -78,7 +80,8 @@ static bool choose(const pl_scene *scene, const pl_compositions *compositions, d
     fronts->flat_bytes = primitives < 1e17 ? (uint64_t)(primitives * pl_front_plan_flat_bytes()) : UINT64_MAX;
     double floor;
     ok = ok && (*plan = pl_front_plan_create(compositions, &pilot, true, error)) &&
-         pl_front_plan_budget(*plan, budget, fill, &floor, &fits, error);
+         pl_front_plan_budget(*plan, budget - (fill ? LINKS_ROOM * (double)options->memory : 0.0), fill, &floor, &fits, error) &&
+         (fits || !fill || pl_front_plan_budget(*plan, budget, true, &floor, &fits, error));
     pl_pilot_free(&pilot);
     if (!ok || fits) return ok;
     if (!fill) return pl_front_plan_budget(*plan, LEAST_GROWTH * floor, false, &floor, &fits, error);
