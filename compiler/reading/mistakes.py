@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from .codes import CODES
 from .diagnostics import Diagnostic, Diagnostics, nearest
 from .grammar import language
+from .missing import is_value, leaf_before, missing
 from .source import Source, Span
 from .vocabulary import UNSUPPORTED_DIRECTIVES
 
@@ -54,18 +55,6 @@ _EXPECTED = {
     "declare": "a declaration looks like #declare Bark = texture { … }",
     "include": 'an include looks like #include "forest.plsys"',
 }
-
-# Nodes in which a missing name is one that is being defined or called, and not an operand.
-_NAMING = (
-    "selection",
-    "calculation",
-    "transformation",
-    "parameters",
-    "named_block",
-    "declare",
-    "parameter",
-    "step",
-)
 
 # Patterns are compiled when something went wrong: most texts are right.
 # What may stand outside of strings and comments.
@@ -197,7 +186,7 @@ def first_error(reading: Reading, node: Node, end: int | None = None) -> Break |
     if broken is None or (end is not None and broken.start_byte >= end):
         return None
     if broken.is_missing:
-        return Break(_missing(reading, broken), True)
+        return Break(_missing(reading, broken, leaf_before(node, broken.start_byte)), True)
     return Break(unexpected(reading, broken), False)
 
 
@@ -213,19 +202,19 @@ def _diagnostic(code: str, span: Span, message: str, hint: str) -> Diagnostic:
     return Diagnostic(code, CODES[code].severity, message, span, hint)
 
 
-def _missing(reading: Reading, node: Node) -> Diagnostic:
-    """The message for a token that tree-sitter put in."""
+def _missing(reading: Reading, node: Node, before: Node | None) -> Diagnostic:
+    """The message for a token that tree-sitter put in after the leaf ``before``."""
     parent = node.parent
     if node.type in CLOSERS:
         opener = next((child for child in parent.children if child.type == CLOSERS[node.type]), None)
         if opener is not None:
             return never_closed(reading, opener.start_byte, opener.type, node.type)
-    what = f"'{node.type}'"
-    if node.type in ("name", "number", "string"):
-        what = "a name" if parent.type in _NAMING else "a value"
-    hint = "the body of a definition or block stands in braces" if node.type == "{" else _expected(parent)
-    end = len(reading.data[: node.start_byte].rstrip())
-    return _diagnostic("missing", reading.after(end), f"{what} is missing here", hint)
+    found = missing(node, before)
+    if found is None:
+        what = "a value" if is_value(node) else "a name" if node.type == "name" else f"'{node.type}'"
+        found = f"{what} is missing here", _expected(parent)
+    end = before.end_byte if before is not None else node.start_byte
+    return _diagnostic("missing", reading.after(end), *found)
 
 
 def never_closed(reading: Reading, offset: int, opener: str, closer: str) -> Diagnostic:
