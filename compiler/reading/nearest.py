@@ -58,7 +58,9 @@ def nearest_of(name: str, indexes: Sequence[NameIndex]) -> str:
         return f"did you mean '{slip}'?"
     if (slip := _without_a_letter(name, indexes)) and all(other.casefold() != name.casefold() for other in found):
         return f"did you mean '{slip}'?"
-    return _hint(name, sorted(found, key=lambda other: (-_alike(name, other), other))[:LIKELIEST])
+    size = len(name)
+    alike = [other for other in found if 2 * min(size, len(other)) >= CLOSE * (size + len(other))]  # can be, by their lengths
+    return _hint(name, sorted(alike, key=lambda other: (-_alike(name, other), other))[:LIKELIEST])
 
 
 def _a_letter_off(name: str, names: Iterable[str]) -> str | None:
