@@ -105,6 +105,8 @@ def touch_of(old: Block, new: Block) -> Touch | None:
     if facts.text[low - 1 : low] in _IN_WORDS or facts.text[high : high + 1] in _IN_WORDS:
         index = _name_at(facts, low, high)
         leaf = facts.names[index].node if index is not None else _leaf_at(facts, low, high)
+    if facts.syntax and facts.tree.root_node.has_error:
+        return None  # what is said of the number may hide it
     for each in facts.syntax:
         if leaf is None or each.span is not leaf.span:
             return None

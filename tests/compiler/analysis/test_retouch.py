@@ -135,6 +135,7 @@ def test_letters_at_many_places(seed):
         ('#include "|a.plsys"\n#declare B = c;\n', "b"),
         ("#declare B = tex|ture { }\n", "x"),  # it is an object now
         ("Tex|ture B { pigment { color rgb 1 } }\n", "x"),
+        ("Calculation C { n = |.60; m .= n; }\n", "0"),  # what is wrong with the number hides the other point
         ("Calculation C { n = 1| -2; }\n", "e"),
         ("Calculation C { n = 1|-2; }\n", "e"),  # one number now
         ("Calculation C { n = |1; }\n", "x"),
