@@ -93,14 +93,19 @@ static bool reserve_chain(pl_bvh_work *w, size_t above, const pl_item *item, pl_
     return most <= w->chain_capacity || grow(&w->chain, most, &w->chain_capacity, sizeof *w->chain, error);
 }
 
-bool pl_bvh_chain(pl_bvh_work *w, const pl_front *front, uint32_t opened, const pl_item *item, size_t *count, pl_error *error)
+bool pl_bvh_chain(pl_bvh_work *w, const pl_front *front, uint32_t opened, const pl_item *item, const pl_item *leaf,
+                  size_t *count, pl_error *error)
 {
     size_t length = 0;
+    if (leaf && leaf != item) {
+        if (!reserve_chain(w, 0, leaf, error)) return false;
+        length = add_transforms(w->chain, 0, leaf);
+    }
     if (front->links) {
         const pl_front_list list = front->opened[opened].list;
         const uint8_t *links = front->links + list.first;
         size_t above = list.length;
-        if (!reserve_chain(w, above, item, error)) return false;
+        if (!reserve_chain(w, length + above, item, error)) return false;
         length = add_transforms(w->chain, length, item);
         while (above > 0) w->chain[length++] = front->maps[links[--above]];
         *count = length;

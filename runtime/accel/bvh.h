@@ -108,8 +108,10 @@ pl_leaf pl_bvh_leaf(const pl_scene *scene, const pl_item *item, const pl_bvh_pla
 bool pl_bvh_offer(pl_tracer *tracer, const pl_bvh_lane *lane, uint32_t frame, pl_ref ref, const pl_item *item,
                   const double o[3], const double d[3], pl_query *query);
 
-/* The transformations on the way from a front's state to an item of an opened node, into work->chain, the last one first. */
-bool pl_bvh_chain(pl_bvh_work *work, const pl_front *front, uint32_t opened, const pl_item *item, size_t *count, pl_error *error);
+/* The transformations on the way from a front's state to an item of an opened node and the leaf that it leads to (NULL: it is an
+ * instance), into work->chain, the last one first. */
+bool pl_bvh_chain(pl_bvh_work *work, const pl_front *front, uint32_t opened, const pl_item *item, const pl_item *leaf,
+                  size_t *count, pl_error *error);
 
 /* Whether a primitive of a frame is the one that the ray leaves (pl_ray): it needn't be evaluated. */
 static inline bool pl_bvh_is_left(const pl_hit *hit, const pl_frame *frames, uint32_t frame, pl_ref ref)

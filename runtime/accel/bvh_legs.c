@@ -48,8 +48,9 @@ static void make_leg(pl_bvh_legs *legs, const pl_states *states, const pl_front 
     const uint32_t index = ref & PL_REF_INDEX, begin = legs->used;
     const uint32_t item = enters ? front->places[index].item : front->primitives[index].item;
     uint32_t at = enters ? front->places[index].opened : front->primitives[index].opened;
-    *leg = (pl_leg){.last = pl_front_item(states, item), .rule = -1, .state = UINT32_MAX, .maps = legs->maps + begin};
-    bool known = join_item(legs, leg, leg->last);
+    const pl_item *last = pl_front_item(states, item), *leaf = enters ? last : pl_front_leaf(states, last);
+    *leg = (pl_leg){.last = leaf, .rule = -1, .state = UINT32_MAX, .maps = legs->maps + begin};
+    bool known = join_item(legs, leg, leaf) && (leaf == last || join_item(legs, leg, last));
     for (; known && at; at = front->opened[at].parent)
         known = join_item(legs, leg, pl_front_item(states, front->opened[at].item));
     leg->map_count = legs->used - begin;

@@ -361,7 +361,8 @@ void pl_fronts_count(const pl_scene *scene, pl_statistics *counts)
 
 bool pl_front_add_items(pl_items *items, const pl_states *states, const pl_front *front, uint32_t opened, const pl_item *last)
 {
-    size_t begin = items->count, count = 1;
+    const pl_item *leaf = pl_front_leaf(states, last);
+    size_t begin = items->count, count = leaf && leaf != last ? 2 : 1;
     for (uint32_t at = opened; at; at = front->opened[at].parent) count++;
     if (begin + count > items->capacity) {
         size_t capacity = 2 * (begin + count) + 16;
@@ -371,6 +372,7 @@ bool pl_front_add_items(pl_items *items, const pl_states *states, const pl_front
         items->capacity = capacity;
     }
     items->count = begin + count;
+    if (leaf && leaf != last) items->list[begin + --count] = leaf;
     items->list[begin + --count] = last;
     for (uint32_t at = opened; at; at = front->opened[at].parent)
         items->list[begin + --count] = pl_front_item(states, front->opened[at].item);

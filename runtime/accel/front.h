@@ -65,7 +65,7 @@ typedef struct pl_front_primitive {
     float stretch;        /* no less than its largest singular value */
     float argument;
     uint32_t opened;     /* where it stands … */
-    uint32_t item;       /* … and which item it is (of pl_states.items); | PL_NO_SHADOW */
+    uint32_t item;       /* … and which item it is or stands in (of pl_states.items; pl_front_leaf); | PL_NO_SHADOW */
 } pl_front_primitive;
 
 /* The composed map from a front's unit frame to that of an instance, p' = L·(p - centre), in one line of the cache. L is
@@ -132,13 +132,23 @@ static inline const pl_item *pl_front_item(const pl_states *states, uint32_t ite
     return &states->items[item & ~PL_NO_SHADOW];
 }
 
+/* The primitive or mesh that an item is, or that the state which it enters consists of: such a state isn't opened, and has no
+ * front. NULL: an instance. With cut-offs all states have gates. */
+static inline const pl_item *pl_front_leaf(const pl_states *states, const pl_item *item)
+{
+    if (item->kind != PL_NODE_ENTER) return item;
+    const pl_state *state = &states->list[item->what];
+    return state->item_count == 1 && state->items->kind != PL_NODE_ENTER && !states->cuts ? state->items : NULL;
+}
+
 /* Whether an item has primitives. */
 static inline bool pl_front_occurs(const pl_states *states, const pl_item *item)
 {
     return item->kind != PL_NODE_ENTER || states->list[item->what].primitives > 0;
 }
 
-/* Adds the items on the way through a front: those of the states opened down to `opened`, then `last`. false: no memory. */
+/* Adds the items on the way through a front: those of the states opened down to `opened`, then `last`, then the leaf that this
+ * leads to. false: no memory. */
 bool pl_front_add_items(pl_items *items, const pl_states *states, const pl_front *front, uint32_t opened, const pl_item *last);
 
 typedef struct pl_fronts {

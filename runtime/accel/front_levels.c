@@ -61,7 +61,7 @@ static void add_bytes(pl_front_levels *levels, uint32_t end, const pl_front_plan
         for (uint32_t k = 0; k < state->item_count; k++) {
             const pl_item *item = &state->items[k];
             if (!pl_front_occurs(states, item)) continue;
-            if (item->kind != PL_NODE_ENTER) bytes[index] += pl_front_primitive_bytes();
+            if (pl_front_leaf(states, item)) bytes[index] += pl_front_primitive_bytes();
             else if (plan->single[item->what] || states->list[item->what].depth > levels->depth[end])
                 bytes[index] += bytes[item->what];
             else bytes[index] += pl_front_instance_share(plan->fine[index]);

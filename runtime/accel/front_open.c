@@ -182,7 +182,8 @@ static uint32_t number_of(const pl_states *states, const pl_item *item)
     return (uint32_t)(item - states->items);
 }
 
-static void add_primitive(opening *o, const chain *at, const pl_item *item, bool no_shadow)
+/* leaf: what the item is, or what stands alone in the state that it enters. */
+static void add_primitive(opening *o, const chain *at, const pl_item *item, const pl_item *leaf, bool no_shadow)
 {
     const pl_states *states = o->plan->compositions->states;
     const size_t place = o->primitive++;
@@ -199,14 +200,14 @@ static void add_primitive(opening *o, const chain *at, const pl_item *item, bool
             (float)(m[4 * r] * centre[0] + m[4 * r + 1] * centre[1] + m[4 * r + 2] * centre[2] + m[4 * r + 3]);
     }
     p->stretch = pl_round_up(sqrt(square) * (1.0 + 0x1p-20));
-    p->argument = (float)item->arguments[0];
+    p->argument = (float)leaf->arguments[0];
     p->opened = (uint32_t)o->opened - 1;
     p->item = number_of(states, item) | (no_shadow ? PL_NO_SHADOW : 0);
-    const bool mesh = item->kind == PL_NODE_MESH;
-    const pl_shape *shape = mesh ? NULL : pl_shape_of(item->what);
-    const pl_box box = mesh ? pl_box_map(&at->to_parent, pl_mesh_box(states->meshes[item->what]))
-                            : pl_shape_box(shape, item->arguments, at->to_parent.m);
-    const uint32_t kind = mesh ? PL_KIND_MESH : item->what;
+    const bool mesh = leaf->kind == PL_NODE_MESH;
+    const pl_shape *shape = mesh ? NULL : pl_shape_of(leaf->what);
+    const pl_box box = mesh ? pl_box_map(&at->to_parent, pl_mesh_box(states->meshes[leaf->what]))
+                            : pl_shape_box(shape, leaf->arguments, at->to_parent.m);
+    const uint32_t kind = mesh ? PL_KIND_MESH : leaf->what;
     set_box(o, place, &box, !mesh && !shape->support, pl_ref_of(kind, (uint32_t)place));
 }
 
@@ -322,7 +323,8 @@ static bool open_state(opening *o, const place *from)
         if (!pl_front_occurs(states, item)) continue;
         const bool no_shadow = from->no_shadow || item->no_shadow;
         const double reached = from->reached * (double)o->plan->probability[composition];
-        if (item->kind == PL_NODE_ENTER && pl_front_opens(o->plan, o->plan->threshold[o->front->state], reached, item->what)) {
+        const pl_item *leaf = pl_front_leaf(states, item);
+        if (!leaf && pl_front_opens(o->plan, o->plan->threshold[o->front->state], reached, item->what)) {
             place *next = push(o);
             if (!next) return false;
             *next = (place){from->at, item, reached, opened, no_shadow};
@@ -331,8 +333,9 @@ static bool open_state(opening *o, const place *from)
         }
         chain at = from->at;
         chain_append(&at, &made->list[composition]);
-        if (item->kind == PL_NODE_ENTER) add_instance(o, &at, item, no_shadow);
-        else add_primitive(o, &at, item, no_shadow);
+        if (leaf && leaf != item) chain_append(&at, &made->list[made->first[item->what]]);
+        if (leaf) add_primitive(o, &at, item, leaf, no_shadow || leaf->no_shadow);
+        else add_instance(o, &at, item, no_shadow);
     }
     return true;
 }

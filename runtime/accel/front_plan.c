@@ -148,7 +148,7 @@ static void find_bytes(pl_front_plan *plan)
         for (uint32_t k = 0; k < state->item_count; k++) {
             const pl_item *item = &state->items[k];
             if (!pl_front_occurs(states, item)) continue;
-            if (item->kind != PL_NODE_ENTER) bytes += PRIMITIVE_BYTES;
+            if (pl_front_leaf(states, item)) bytes += PRIMITIVE_BYTES;
             else bytes += instance_bytes + (plan->price_free[item->what] ? plan->bytes[item->what] : 0.0);
         }
         plan->bytes[index] = fmax(bytes - instance_bytes, 1.0);
@@ -286,7 +286,7 @@ static bool count_below(const pl_front_plan *plan, pl_front_counting *counting, 
             const pl_item *item = &it->items[i];
             if (!pl_front_occurs(states, item)) continue;
             const double reached = at.reached * (double)probabilities[i];
-            if (item->kind != PL_NODE_ENTER) {
+            if (pl_front_leaf(states, item)) {
                 counts->primitives++;
             } else if (pl_front_opens(plan, threshold, reached, item->what)) {
                 counting->stack[top++] = (pl_plan_entry){item->what, reached};

@@ -21,19 +21,23 @@ static inline __attribute__((always_inline)) void map_step(const pl_transform *t
     }
 }
 
-/* Maps a ray from a front's state to an item of an opened node, one transformation after another. */
+/* Maps a ray from a front's state to an item of an opened node and the leaf that it leads to (NULL: it is an instance), one
+ * transformation after another. */
 static inline __attribute__((always_inline)) bool map_down(pl_bvh_work *w, const pl_front *front, uint32_t opened,
-                                                           const pl_item *item, double4 *o, double4 *d, pl_error *error)
+                                                           const pl_item *item, const pl_item *leaf, double4 *o, double4 *d,
+                                                           pl_error *error)
 {
     if (front->links) {
         const pl_front_list list = front->opened[opened].list;
         const uint8_t *links = front->links + list.first;
         for (uint32_t i = 0; i < list.length; i++) map_step(front->maps[links[i]], o, d);
         for (uint32_t i = 0; i < item->transform_count; i++) map_step(item->transforms[i], o, d);
+        if (!leaf || leaf == item) return true;
+        for (uint32_t i = 0; i < leaf->transform_count; i++) map_step(leaf->transforms[i], o, d);
         return true;
     }
     size_t count;
-    if (!pl_bvh_chain(w, front, opened, item, &count, error)) return false;
+    if (!pl_bvh_chain(w, front, opened, item, leaf, &count, error)) return false;
     while (count > 0) map_step(w->chain[--count], o, d);
     return true;
 }
@@ -58,18 +62,18 @@ static bool evaluate(pl_tracer *tracer, pl_bvh_lane *lane, uint32_t frame, pl_re
         const pl_front *front = lane->frames[from].front;
         pl_frame *below = &lane->frames[from + 1];
         const pl_front_place *at = &front->places[below->instance];
-        if (!map_down(w, front, at->opened, pl_front_item(states, at->item), &o, &d, query->error)) return false;
+        if (!map_down(w, front, at->opened, pl_front_item(states, at->item), NULL, &o, &d, query->error)) return false;
         *(double4 *)below->normative_o = o;
         *(double4 *)below->normative_d = d;
         below->mapped = true;
     }
     const pl_front *front = lane->frames[frame].front;
     const pl_front_primitive *p = &front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = pl_front_item(states, p->item);
+    const pl_item *item = pl_front_item(states, p->item), *leaf = pl_front_leaf(states, item);
     double in_o[4], in_d[4];
-    if (!map_down(w, front, p->opened, item, &o, &d, query->error)) return false;
+    if (!map_down(w, front, p->opened, item, leaf, &o, &d, query->error)) return false;
     *(double4 *)in_o = o;
     *(double4 *)in_d = d;
     wide_end();
-    return pl_bvh_offer(tracer, lane, frame, ref, item, in_o, in_d, query);
+    return pl_bvh_offer(tracer, lane, frame, ref, leaf, in_o, in_d, query);
 }

@@ -91,7 +91,7 @@ static bool map_packet(const pl_scene *scene, pl_bvh_work *w, uint32_t index, un
         const pl_front_place *it = &parent->front->places[f->instance];
         const pl_item *item = pl_front_item(&scene->states, it->item);
         size_t count;
-        if (!pl_bvh_chain(w, parent->front, it->opened, item, &count, error)) return false;
+        if (!pl_bvh_chain(w, parent->front, it->opened, item, NULL, &count, error)) return false;
         /* Quads that were mapped before are mapped again to the same numbers. */
         for (unsigned rest = quads; rest; rest &= rest - 1) {
             const int first = 4 * __builtin_ctz(rest);
@@ -120,15 +120,16 @@ static bool offer_lane(pl_tracer *tracer, uint32_t index, pl_ref ref, int lane, 
     pl_bvh_work *w = tracer->work;
     const pl_packet_frame *f = &w->packets[index];
     const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = pl_front_item(&tracer->scene->states, p->item);
+    const pl_states *states = &tracer->scene->states;
+    const pl_item *item = pl_front_item(states, p->item), *leaf = pl_front_leaf(states, item);
     double4 o = {f->normative.o[0][lane], f->normative.o[1][lane], f->normative.o[2][lane]};
     double4 d = {f->normative.d[0][lane], f->normative.d[1][lane], f->normative.d[2][lane]};
     double in_o[4], in_d[4];
-    if (!map_down(w, f->front, p->opened, item, &o, &d, queries->error)) return false;
+    if (!map_down(w, f->front, p->opened, item, leaf, &o, &d, queries->error)) return false;
     *(double4 *)in_o = o;
     *(double4 *)in_d = d;
     wide_end();
-    if (!pl_bvh_offer(tracer, w->lanes, index, ref, item, in_o, in_d, &queries[lane])) return false;
+    if (!pl_bvh_offer(tracer, w->lanes, index, ref, leaf, in_o, in_d, &queries[lane])) return false;
     t_max[lane] = queries[lane].t_max;
     return true;
 }
@@ -140,14 +141,14 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     const pl_scene *scene = tracer->scene;
     const pl_packet_frame *f = &w->packets[index];
     const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = pl_front_item(&scene->states, p->item);
+    const pl_item *item = pl_front_item(&scene->states, p->item), *leaf_item = pl_front_leaf(&scene->states, item);
     unsigned quads = quads_of(lanes);
     /* Where rays go each their own way, most of them have a candidate sooner or later. */
     if (!map_packet(scene, w, index, f->each ? quads_of(f->lanes) & ~f->mapped : quads, queries->error)) return false;
     w->answers++;
     if (!(lanes & (lanes - 1))) return offer_lane(tracer, index, ref, __builtin_ctz(lanes), queries, t_max);
     size_t count;
-    if (!pl_bvh_chain(w, f->front, p->opened, item, &count, queries->error)) return false;
+    if (!pl_bvh_chain(w, f->front, p->opened, item, leaf_item, &count, queries->error)) return false;
     pl_lanes rays;
     for (; quads; quads &= quads - 1) {
         const int first = 4 * __builtin_ctz(quads);
@@ -157,7 +158,7 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     wide_end();
     tracer->counters.primitive_tests += (unsigned)__builtin_popcount(lanes);
     const pl_bvh_place place = {w->lanes, index, ref};
-    pl_leaf leaf = pl_bvh_leaf(scene, item, &place);
+    pl_leaf leaf = pl_bvh_leaf(scene, leaf_item, &place);
     for (; lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
         const double o[3] = {rays.o[0][lane], rays.o[1][lane], rays.o[2][lane]};
