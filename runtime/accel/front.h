@@ -63,7 +63,10 @@ typedef struct pl_opened {
 typedef struct pl_front_primitive {
     float columns[3 * 4]; /* unit frame -> shape, column by column; one more number is read with the last */
     float stretch;        /* no less than its largest singular value */
-    float argument;
+    union {
+        float argument; /* of a cone or torus; of others … */
+        uint32_t leaf;  /* … which item they are (of pl_states.items) */
+    };
     uint32_t opened;     /* where it stands … */
     uint32_t item;       /* … and which item it is or stands in (of pl_states.items; pl_front_leaf); | PL_NO_SHADOW */
 } pl_front_primitive;
@@ -139,6 +142,17 @@ static inline const pl_item *pl_front_leaf(const pl_states *states, const pl_ite
     if (item->kind != PL_NODE_ENTER) return item;
     const pl_state *state = &states->list[item->what];
     return state->item_count == 1 && state->items->kind != PL_NODE_ENTER && !states->cuts ? state->items : NULL;
+}
+
+static inline bool pl_front_has_argument(uint32_t kind)
+{
+    return kind == PL_SHAPE_CONE || kind == PL_SHAPE_TORUS;
+}
+
+/* What a front's primitive is. Its number is at hand but in cones and tori: finding it by the state takes two loads more. */
+static inline const pl_item *pl_front_leaf_of(const pl_states *states, const pl_front_primitive *p, uint32_t kind)
+{
+    return pl_front_has_argument(kind) ? pl_front_leaf(states, pl_front_item(states, p->item)) : &states->items[p->leaf];
 }
 
 /* Whether an item has primitives. */

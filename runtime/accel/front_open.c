@@ -200,7 +200,6 @@ static void add_primitive(opening *o, const chain *at, const pl_item *item, cons
             (float)(m[4 * r] * centre[0] + m[4 * r + 1] * centre[1] + m[4 * r + 2] * centre[2] + m[4 * r + 3]);
     }
     p->stretch = pl_round_up(sqrt(square) * (1.0 + 0x1p-20));
-    p->argument = (float)leaf->arguments[0];
     p->opened = (uint32_t)o->opened - 1;
     p->item = number_of(states, item) | (no_shadow ? PL_NO_SHADOW : 0);
     const bool mesh = leaf->kind == PL_NODE_MESH;
@@ -208,6 +207,8 @@ static void add_primitive(opening *o, const chain *at, const pl_item *item, cons
     const pl_box box = mesh ? pl_box_map(&at->to_parent, pl_mesh_box(states->meshes[leaf->what]))
                             : pl_shape_box(shape, leaf->arguments, at->to_parent.m);
     const uint32_t kind = mesh ? PL_KIND_MESH : leaf->what;
+    if (pl_front_has_argument(kind)) p->argument = (float)leaf->arguments[0];
+    else p->leaf = number_of(states, leaf);
     set_box(o, place, &box, !mesh && !shape->support, pl_ref_of(kind, (uint32_t)place));
 }
 

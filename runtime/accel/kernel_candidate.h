@@ -69,7 +69,7 @@ static bool evaluate(pl_tracer *tracer, pl_bvh_lane *lane, uint32_t frame, pl_re
     }
     const pl_front *front = lane->frames[frame].front;
     const pl_front_primitive *p = &front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = pl_front_item(states, p->item), *leaf = pl_front_leaf(states, item);
+    const pl_item *item = pl_front_item(states, p->item), *leaf = pl_front_leaf_of(states, p, ref >> PL_REF_SHIFT);
     double in_o[4], in_d[4];
     if (!map_down(w, front, p->opened, item, leaf, &o, &d, query->error)) return false;
     *(double4 *)in_o = o;

@@ -121,7 +121,7 @@ static bool offer_lane(pl_tracer *tracer, uint32_t index, pl_ref ref, int lane, 
     const pl_packet_frame *f = &w->packets[index];
     const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
     const pl_states *states = &tracer->scene->states;
-    const pl_item *item = pl_front_item(states, p->item), *leaf = pl_front_leaf(states, item);
+    const pl_item *item = pl_front_item(states, p->item), *leaf = pl_front_leaf_of(states, p, ref >> PL_REF_SHIFT);
     double4 o = {f->normative.o[0][lane], f->normative.o[1][lane], f->normative.o[2][lane]};
     double4 d = {f->normative.d[0][lane], f->normative.d[1][lane], f->normative.d[2][lane]};
     double in_o[4], in_d[4];
@@ -141,7 +141,8 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     const pl_scene *scene = tracer->scene;
     const pl_packet_frame *f = &w->packets[index];
     const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
-    const pl_item *item = pl_front_item(&scene->states, p->item), *leaf_item = pl_front_leaf(&scene->states, item);
+    const pl_item *item = pl_front_item(&scene->states, p->item);
+    const pl_item *leaf_item = pl_front_leaf_of(&scene->states, p, ref >> PL_REF_SHIFT);
     unsigned quads = quads_of(lanes);
     /* Where rays go each their own way, most of them have a candidate sooner or later. */
     if (!map_packet(scene, w, index, f->each ? quads_of(f->lanes) & ~f->mapped : quads, queries->error)) return false;
