@@ -12,6 +12,8 @@ underflow to a singular matrix.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from .. import graph as g
 from ..matrices import is_singular, regular_product
 
@@ -20,17 +22,27 @@ def merge(graph: g.Graph) -> None:
     absorbed: set[int] = set()
     for i in list(graph.reachable()):  # outer ones first
         node = graph.nodes[i]
-        if i in absorbed or not isinstance(node, g.Transform) or is_singular(node.matrix):
+        if i in absorbed or not isinstance(node, g.Transform):
             continue
-        while isinstance(inner := graph.nodes[node.child], g.Transform) and not is_singular(inner.matrix):
-            product = regular_product(node.matrix, inner.matrix)
-            if product is None:
-                break
+        while isinstance(inner := graph.nodes[node.child], g.Transform) and (
+            both := joined(graph, node, inner)
+        ):
             absorbed.add(node.child)
-            why = f"merged into {_shown(node)}, which stands before it"
-            graph.left_out.append(g.LeftOut(_shown(inner), why))
-            node.name = "*".join(name for name in (node.name, inner.name) if name)
-            node.matrix, node.child = product, inner.child
+            node.name, node.matrix, node.child = both.name, both.matrix, both.child
+
+
+def joined(graph: g.Graph, outer: g.Transform, inner: g.Transform) -> g.Transform | None:
+    """Both as one, above what stands below ``inner``, which is noted; None where one is singular, or their product isn't
+    regular."""
+    if is_singular(outer.matrix) or is_singular(inner.matrix):
+        return None
+    matrix = regular_product(outer.matrix, inner.matrix)
+    if matrix is None:
+        return None
+    why = f"merged into {_shown(outer)}, which stands before it"
+    graph.left_out.append(g.LeftOut(_shown(inner), why))
+    name = "*".join(name for name in (outer.name, inner.name) if name)
+    return replace(outer, name=name, matrix=matrix, child=inner.child)
 
 
 def _shown(node: g.Transform) -> str:
