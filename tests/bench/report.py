@@ -95,9 +95,8 @@ class Results:
             for name, points in self.curves.items():
                 for label, style, xs, ys in lines_of(name, points) if name.startswith(kind) else ():
                     axis.plot(xs, ys, style, label=label)
-                for point in points if kind == "fronts" and name.startswith(kind) else ():
-                    items = "all" if point["items"] > 1e9 else point["items"]
-                    axis.annotate(items, (point["bytes"] * 1e-6, point["coherent"]), (0, 5), textcoords="offset points", fontsize=7)
+                for text, *at in labels_of(points) if kind == "fronts" and name.startswith(kind) else ():
+                    axis.annotate(text, at, (0, 5), textcoords="offset points", fontsize=7)
             axis.set(title=title, xlabel=x, ylabel=y)
             if logarithmic:
                 axis.set(xscale="log", yscale="log")
@@ -143,6 +142,17 @@ def lines_of(name: str, points: list[dict]):
     else:
         yield short, "o-", column("threads"), column("rate")
         yield f"{short}, in proportion", "k:", column("threads"), [points[0]["rate"] * n for n in column("threads")]
+
+
+def labels_of(points: list[dict]) -> list[tuple[str, float, float]]:
+    """(items a front, MB, coherent rate) of the points on a curve of fronts; one label for those that are hardly apart."""
+    labels: list[tuple[str, float, float]] = []
+    for point in points:
+        text, x, y = "all" if point["items"] > 1e9 else str(point["items"]), point["bytes"] * 1e-6, point["coherent"]
+        if labels and all(0.8 < new / old < 1.25 for new, old in zip((x, y), labels[-1][1:])):
+            text = f"{labels.pop()[0].partition('–')[0]}–{text}"
+        labels.append((text, x, y))
+    return labels
 
 
 def number(value: float) -> str:

@@ -23,7 +23,7 @@ from prepare import (
     triangles_of,
     write_embree,
 )
-from report import Results, Row, size
+from report import Results, Row, labels_of, size
 
 from plsys.runtime import Scene
 
@@ -145,6 +145,12 @@ def test_rows_are_judged_by_the_median(tmp_path, capsys):
     data = json.loads((tmp_path / "bench.json").read_text())
     assert data["rows"][0]["value"] == 1.2 and data["rows"][1]["met"] is False and data["cores"] == 2
     assert Row("", "", 1, 1, 1, "", None, False).met is None and size(2.5e6) == "2.5 MB"
+
+
+def test_points_that_are_hardly_apart_share_a_label():
+    at = [(1, 2.0e4, 5.0), (21, 2.1e4, 5.2), (256, 2.1e4, 5.3), (1024, 1e5, 6.0), (2**62, 1e7, 5.9)]
+    points = [{"items": items, "bytes": size, "coherent": rate} for items, size, rate in at]
+    assert [label for label, *_ in labels_of(points)] == ["1–256", "1024", "all"]
 
 
 def test_curves_are_drawn(tmp_path):
