@@ -105,6 +105,15 @@ static void begin_hit(pl_hit *hit)
     hit->cut_depth = 0;
 }
 
+/* A hit on what is cut is counted. */
+static void count_cut(pl_tracer *tracer, const pl_query *query)
+{
+    const pl_hit *hit = query->hit;
+    if (!query->found || !hit->cut_depth) return;
+    tracer->counters.cuts++;
+    tracer->counters.cut_error = fmax(tracer->counters.cut_error, hit->bound * query->length);
+}
+
 bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_error *error)
 {
     pl_query query;
@@ -115,10 +124,7 @@ bool pl_trace_nearest(pl_tracer *tracer, const pl_ray *ray, pl_hit *hit, pl_erro
         hit->t = INFINITY;
         return false;
     }
-    if (query.found && hit->cut_depth) {
-        tracer->counters.cuts++;
-        tracer->counters.cut_error = fmax(tracer->counters.cut_error, hit->bound * query.length);
-    }
+    count_cut(tracer, &query);
     return true;
 }
 
@@ -141,7 +147,10 @@ static bool trace_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl
 unsigned pl_trace_nearest_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl_hit *hits, pl_error *error)
 {
     pl_query queries[PL_TRACE_MANY];
-    if (trace_many(tracer, rays, count, PL_QUERY_NEAREST, hits, queries)) return count;
+    if (trace_many(tracer, rays, count, PL_QUERY_NEAREST, hits, queries)) {
+        for (unsigned i = 0; i < count; i++) count_cut(tracer, &queries[i]);
+        return count;
+    }
     for (unsigned i = 0; i < count; i++)
         if (!pl_trace_nearest(tracer, &rays[i], &hits[i], error)) return i;
     return count;

@@ -22,7 +22,17 @@ static bool grow(void *array, size_t least, size_t *capacity, size_t element, pl
 
 bool pl_gated_grow_frames(pl_gated_work *w, size_t count, pl_error *error)
 {
-    return grow(&w->frames, count + 1, &w->frame_capacity, sizeof *w->frames, error);
+    const size_t before = w->frame_capacity;
+    if (count < before) return true;
+    if (!grow(&w->frames, count + 1, &w->frame_capacity, sizeof *w->frames, error)) return false;
+    pl_gated_place *places = realloc(w->places, w->frame_capacity * PL_LANES * sizeof *places);
+    if (!places) {
+        w->frame_capacity = before;
+        return pl_fail_memory(error, "tracing a ray");
+    }
+    w->places = places;
+    for (size_t i = before * PL_LANES; i < w->frame_capacity * PL_LANES; i++) places[i].serial = 0;
+    return true;
 }
 
 bool pl_gated_grow_stack(pl_gated_work *w, size_t top, pl_error *error)
@@ -34,7 +44,9 @@ static void work_destroy(void *memory)
 {
     pl_gated_work *w = memory;
     if (!w) return;
+    if (w->packets) pl_accel_bvh.work_destroy(w->packets);
     free(w->frames);
+    free(w->places);
     free(w->stack);
     free(w->chain);
     free(w);
@@ -45,7 +57,9 @@ static void *work_create(const pl_scene *scene, pl_error *error)
     pl_gated_work *w = calloc(1, sizeof *w);
     if (w) w->states = &scene->states;
     if (!w) pl_fail_memory(error, "preparing to trace");
-    else if (pl_gated_grow_frames(w, 0, error) && pl_gated_grow_stack(w, 0, error)) return w;
+    else if (pl_gated_grow_frames(w, 0, error) && pl_gated_grow_stack(w, 0, error) &&
+             (w->packets = pl_accel_bvh.work_create(scene, error)))
+        return w;
     work_destroy(w);
     return NULL;
 }
@@ -80,24 +94,6 @@ static bool map_down(pl_gated_work *w, const pl_front *front, uint32_t opened, c
     return count > 0;
 }
 
-/* The normative ray of a frame, from the deepest frame above that has one. */
-static bool map_frame(const pl_scene *scene, pl_gated_work *w, uint32_t index, pl_error *error)
-{
-    uint32_t from = index;
-    while (!w->frames[from].at.mapped) from--;
-    for (; from < index; from++) {
-        const pl_frame *parent = &w->frames[from].at;
-        pl_frame *f = &w->frames[from + 1].at;
-        memcpy(f->normative_o, parent->normative_o, sizeof f->normative_o);
-        memcpy(f->normative_d, parent->normative_d, sizeof f->normative_d);
-        if (!map_down(w, parent->front, parent->front->places[f->instance].opened,
-                      instance_item(scene, parent->front, f->instance), f->normative_o, f->normative_d, error))
-            return false;
-        f->mapped = true;
-    }
-    return true;
-}
-
 /* The same with all that gates need. Where a box lies within the one around it, that one's span takes nothing away. */
 static bool place_down(const pl_scene *scene, pl_gated_work *w, const pl_front *front, uint32_t opened,
                        const pl_item *item, pl_gated_place *place, pl_error *error)
@@ -119,21 +115,30 @@ static bool place_down(const pl_scene *scene, pl_gated_work *w, const pl_front *
     return count > 0;
 }
 
+/* Finds the place of the ray under way in a frame, from the deepest frame above where it is known. */
 static bool place_frame(const pl_scene *scene, pl_gated_work *w, uint32_t index, pl_error *error)
 {
     uint32_t from = index;
-    while (!w->frames[from].placed) from--;
+    while (pl_gated_place_in(w, from)->serial != w->frames[from].serial) from--;
     for (; from < index; from++) {
         const pl_front *front = w->frames[from].at.front;
-        pl_gated_frame *f = &w->frames[from + 1];
-        const uint32_t instance = f->at.instance;
-        f->place = w->frames[from].place;
-        if (!place_down(scene, w, front, front->places[instance].opened, instance_item(scene, front, instance),
-                        &f->place, error))
+        const uint32_t instance = w->frames[from + 1].at.instance;
+        pl_gated_place *place = pl_gated_place_in(w, from + 1);
+        *place = *pl_gated_place_in(w, from);
+        place->serial = 0;
+        if (!place_down(scene, w, front, front->places[instance].opened, instance_item(scene, front, instance), place, error))
             return false;
-        f->placed = true;
+        place->serial = w->frames[from + 1].serial;
     }
     return true;
+}
+
+void pl_gated_begin(pl_gated_work *w, const pl_ray *ray, double t_min)
+{
+    pl_gated_place *place = pl_gated_place_in(w, 0);
+    *place = (pl_gated_place){.stretch = 1.0, .within = {t_min, INFINITY}, .serial = w->frames[0].serial};
+    memcpy(place->o, ray->origin, sizeof place->o);
+    memcpy(place->d, ray->direction, sizeof place->d);
 }
 
 /* --- offering --- */
@@ -170,10 +175,11 @@ bool pl_gated_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query 
     const pl_front *front = f->at.front;
     const pl_front_primitive *primitive = &front->primitives[ref & PL_REF_INDEX];
     const pl_item *item = pl_front_item(&scene->states, primitive->item);
-    if (!f->at.mapped && !map_frame(scene, w, frame, query->error)) return false;
+    if (!place_frame(scene, w, frame, query->error)) return false;
+    const pl_gated_place *place = pl_gated_place_in(w, frame);
     double o[3], d[3];
-    memcpy(o, f->at.normative_o, sizeof o);
-    memcpy(d, f->at.normative_d, sizeof d);
+    memcpy(o, place->o, sizeof o);
+    memcpy(d, place->d, sizeof d);
     if (!map_down(w, front, primitive->opened, item, o, d, query->error)) return false;
     source s = {scene, w, frame, ref};
     pl_leaf leaf = {
@@ -205,16 +211,16 @@ int pl_gated_arrive(pl_tracer *tracer, uint32_t frame, uint32_t instance, bool c
         if (most < 0.0) return pl_fail_memory(query->error, "measuring coverages"), -1;
         if (!(pl_cut_chance(hash, depth, query->ray) < most)) return 0;
     }
-    if (!f->placed && !place_frame(scene, w, frame, query->error)) return -1;
-    pl_gated_place place = f->place;
+    if (!place_frame(scene, w, frame, query->error)) return -1;
+    pl_gated_place place = *pl_gated_place_in(w, frame);
     if (!place_down(scene, w, front, front->places[instance].opened, item, &place, query->error)) return -1;
     pl_arrival arrival = {item->what, place.o, place.d, place.stretch, place.within, depth};
     double t_entry;
     switch (pl_query_gate(query, states, &arrival, &t_entry, &place.within)) {
     case PL_GATE_MISSED: return 0;
     case PL_GATE_OPEN:
-        w->frames[frame + 1].place = place;
-        w->frames[frame + 1].placed = true;
+        place.serial = w->frames[frame + 1].serial;
+        *pl_gated_place_in(w, frame + 1) = place;
         return 1;
     case PL_GATE_CUT: break;
     }
@@ -260,6 +266,16 @@ static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     }
 }
 
+static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
+{
+#ifdef __x86_64__
+    if (tracer->scene->isa != PL_ISA_SCALAR && count >= PL_LEAST_LANES) return pl_gated_packet_avx2(tracer, rays, queries, count);
+#endif
+    for (unsigned i = 0; i < count; i++)
+        if (!trace(tracer, &rays[i], &queries[i])) return false;
+    return true;
+}
+
 const pl_accel pl_accel_gated = {.name = "bvh",
                                  .states = true,
                                  .build = pl_gated_build,
@@ -267,4 +283,5 @@ const pl_accel pl_accel_gated = {.name = "bvh",
                                  .work_create = work_create,
                                  .work_destroy = work_destroy,
                                  .trace = trace,
+                                 .trace_many = trace_many,
                                  .items = trail_items};

@@ -9,7 +9,8 @@
  * An instance has a gate of its own. The kernel goes in where it is clearly open; elsewhere pl_gated_arrive decides in
  * double, from the ray mapped down the path. What rungs there are never shows in a hit.
  *
- *     gated_build.c  the rungs, K, budget      gated_kernel.h  traversal      gated.c  what is decided in double */
+ *     gated_build.c  the rungs, K, budget      gated_kernel.h  traversal      gated_packet.h  that of many rays at once
+ *     gated.c        what is decided in double */
 #ifndef PL_GATED_H
 #define PL_GATED_H
 
@@ -53,36 +54,53 @@ typedef struct pl_gated {
 /* A ray in the frame of a state, mapped down the path, and what gates need to know of the path. */
 typedef struct pl_gated_place {
     double o[3], d[3], stretch;
-    pl_span within; /* of the instances above, and of this one as far as it is needed */
+    pl_span within;  /* of the instances above, and of this one as far as it is needed */
+    uint64_t serial; /* of the frame that this is the place in */
 } pl_gated_place;
 
+/* Of a path, which the rays of a packet have in common; .at is a single ray's. */
 typedef struct pl_gated_frame {
     pl_frame at;
     const pl_gated_rung *rung;
-    double stretch; /* nearly the normative product */
-    double to;      /* no gate below is entered later */
-    uint64_t hash;  /* of the path to here */
-    uint32_t depth; /* symbols entered on it */
-    bool placed;
-    pl_gated_place place;
+    double stretch;  /* nearly the normative product */
+    double to;       /* no gate below is entered later */
+    uint64_t hash;   /* of the path to here */
+    uint32_t depth;  /* symbols entered on it */
+    uint64_t serial; /* no two frames of a tracer have the same */
 } pl_gated_frame;
 
 typedef struct pl_gated_work {
     const pl_states *states;
     pl_gated_frame *frames;
+    pl_gated_place *places; /* of PL_LANES rays in each frame */
+    unsigned lane;          /* the ray under way */
+    uint64_t serial;        /* of the newest frame */
     uint64_t *stack;
     const pl_item **chain;
     size_t frame_capacity, stack_capacity, chain_capacity;
+    pl_bvh_work *packets; /* of which only what belongs to packets is used */
 } pl_gated_work;
+
+/* The place of the ray under way in a frame: known if it has the frame's serial. */
+static inline pl_gated_place *pl_gated_place_in(const pl_gated_work *work, uint32_t frame)
+{
+    return &work->places[(size_t)frame * PL_LANES + work->lane];
+}
 
 typedef bool pl_gated_kernel(pl_tracer *tracer, const pl_ray *ray, pl_query *query);
 extern pl_gated_kernel pl_gated_trace_scalar, pl_gated_trace_avx2, pl_gated_trace_avx512;
+
+/* Of several rays, whether or not they go the same way. */
+extern pl_bvh_many_kernel pl_gated_packet_avx2;
+
+/* The ray under way begins: its place in frame 0. */
+void pl_gated_begin(pl_gated_work *work, const pl_ray *ray, double t_min);
 
 /* Evaluates a primitive of a frame normatively and offers it. false: an error. */
 bool pl_gated_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query *query);
 
 /* Decides at the gate of an instance, whose frame + 1 has its hash; where it is cut, offers its box. cut: if it isn't missed,
- * it is cut. 1: open, and frame + 1 is placed; 0: not; -1: an error. */
+ * it is cut. 1: open, and the place in frame + 1 is known; 0: not; -1: an error. */
 int pl_gated_arrive(pl_tracer *tracer, uint32_t frame, uint32_t instance, bool cut, pl_query *query);
 
 /* Room for one more frame, for eight more entries above `top`; false: no memory. */

@@ -62,39 +62,62 @@ static __attribute__((noinline)) bool pass_gate(pl_tracer *tracer, uint32_t inde
     return true;
 }
 
-/* Goes into an instance: frame `index` + 1. 0: it isn't gone into, 1: it is, 2: only what is unbounded, -1: an error. */
-static inline int gated_descend(pl_tracer *tracer, uint32_t index, uint32_t instance, pl_query *query, float *local_max)
+/* The path goes on into an instance: frame `index` + 1 as far as it is the same for all rays. */
+static inline const pl_gated_state *gated_step(pl_gated_work *w, const pl_gated *gated, uint32_t index, uint32_t instance)
 {
-    pl_gated_work *w = tracer->work;
-    const pl_gated *gated = tracer->scene->structure;
-    if (index + 1 >= w->frame_capacity && !pl_gated_grow_frames(w, index + 1, query->error)) return -1;
     const pl_gated_frame *parent = &w->frames[index];
     const pl_front_instance *it = &parent->at.front->instances[instance];
     const pl_gated_link *link = &parent->rung->links[instance];
-    if (query->shadow && it->front & PL_NO_SHADOW) return 0;
     const pl_gated_state *state = &gated->states[it->front & ~PL_NO_SHADOW];
     pl_gated_frame *f = &w->frames[index + 1];
     f->rung = &gated->rungs[state->first];
     f->stretch = parent->stretch * link->stretch;
     f->to = parent->to;
-    f->placed = false;
+    f->serial = ++w->serial;
     f->hash = parent->hash * link->power + link->hash;
     f->depth = parent->depth + link->depth;
     f->at.front = &f->rung->front;
     f->at.instance = instance;
+    return state;
+}
+
+/* The gate of an instance whose frame `index` + 1 has begun: the rung to go on with becomes the frame's. *open: whether it is
+ * gone into. false: an error. */
+static inline __attribute__((always_inline)) bool gated_enter(pl_tracer *tracer, uint32_t index, const pl_gated_state *state,
+                                                              pl_query *query, bool *open)
+{
+    pl_gated_frame *f = &((pl_gated_work *)tracer->work)->frames[index + 1];
+    *open = true;
+    if (is_clearly_open(state->least * f->stretch, &query->footprint, f->to) && f->at.distance < state->farthest_inside)
+        return true;
+    const pl_gated_rung *rung;
+    if (!pass_gate(tracer, index, state, query, &rung)) return false;
+    *open = rung != NULL;
+    if (!rung) return true;
+    f->rung = rung;
+    f->at.front = &rung->front;
+    return true;
+}
+
+/* Goes into an instance: frame `index` + 1. 0: it isn't gone into, 1: it is, 2: only what is unbounded, -1: an error. */
+static inline int gated_descend(pl_tracer *tracer, uint32_t index, uint32_t instance, pl_query *query, float *local_max)
+{
+    pl_gated_work *w = tracer->work;
+    if (index + 1 >= w->frame_capacity && !pl_gated_grow_frames(w, index + 1, query->error)) return -1;
+    const pl_frame *parent = &w->frames[index].at;
+    const pl_front_instance *it = &parent->front->instances[instance];
+    if (query->shadow && it->front & PL_NO_SHADOW) return 0;
+    const pl_gated_state *state = gated_step(w, tracer->scene->structure, index, instance);
+    pl_frame *f = &w->frames[index + 1].at;
     double4 o, d;
-    map_into(it, &parent->at, &f->at, &o, &d);
-    if (parent->at.blind) *local_max = local_t_max(&f->at, query->t_max);
+    bool open;
+    map_into(it, parent, f, &o, &d);
+    if (parent->blind) *local_max = local_t_max(f, query->t_max);
     tracer->counters.instances++;
-    const bool met = begin_frame(&f->at, o, d, query->t_max, local_max);
+    const bool met = begin_frame(f, o, d, query->t_max, local_max);
     if (!met && !state->unbounded) return 0;
-    if (!(is_clearly_open(state->least * f->stretch, &query->footprint, f->to) &&
-          f->at.distance < state->farthest_inside)) {
-        if (!pass_gate(tracer, index, state, query, &f->rung)) return -1;
-        if (!f->rung) return 0;
-        f->at.front = &f->rung->front;
-    }
-    return met ? 1 : 2;
+    if (!gated_enter(tracer, index, state, query, &open)) return -1;
+    return !open ? 0 : met ? 1 : 2;
 }
 
 /* Pushes what a frame begins with, below it the way back. */
@@ -110,13 +133,13 @@ static inline bool gated_begin(pl_gated_work *w, const pl_front *front, bool met
     return true;
 }
 
-/* met: the root's box; else only what is unbounded there counts. */
-static inline bool gated_visit(pl_tracer *tracer, pl_query *query, bool met, bool any)
+/* From frame `base` on. met: its box; else only what is unbounded there counts. */
+static inline bool gated_visit(pl_tracer *tracer, uint32_t base, pl_query *query, bool met, bool any)
 {
     pl_gated_work *w = tracer->work;
     uint64_t *stack, steps = 0;
-    uint32_t frame = 0;
-    const pl_gated_frame *f = &w->frames[0];
+    uint32_t frame = base;
+    const pl_gated_frame *f = &w->frames[base];
     size_t top = 0;
     float t_max;
     if (!gated_begin(w, f->at.front, met, &top, query->error)) return false;
@@ -138,7 +161,7 @@ static inline bool gated_visit(pl_tracer *tracer, pl_query *query, bool met, boo
         }
         uint32_t kind = ref >> PL_REF_SHIFT;
         if (kind == PL_KIND_RETURN) {
-            if (frame == 0) break;
+            if (frame == base) break;
             f = &w->frames[--frame];
             t_max = local_t_max(&f->at, query->t_max);
         } else if (kind == PL_KIND_INSTANCE) {
@@ -208,14 +231,11 @@ bool GATED_KERNEL(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
     root->to = met ? passage_of(&root->at).to : INFINITY;
     root->rung = choose_rung(root->rung, state->count, root, &query->footprint);
     root->at.front = &root->rung->front;
-    root->at.mapped = root->placed = true;
-    memcpy(root->at.normative_o, ray->origin, sizeof ray->origin);
-    memcpy(root->at.normative_d, ray->direction, sizeof ray->direction);
-    root->place = (pl_gated_place){.stretch = 1.0, .within = {query->t_min, INFINITY}};
-    memcpy(root->place.o, ray->origin, sizeof root->place.o);
-    memcpy(root->place.d, ray->direction, sizeof root->place.d);
-    const bool ok = query->kind == PL_QUERY_ANY ? gated_visit(tracer, query, met, true)
-                                                : gated_visit(tracer, query, met, false);
+    root->serial = ++w->serial;
+    w->lane = 0;
+    pl_gated_begin(w, ray, query->t_min);
+    const bool ok = query->kind == PL_QUERY_ANY ? gated_visit(tracer, 0, query, met, true)
+                                                : gated_visit(tracer, 0, query, met, false);
     wide_end();
     return ok;
 }

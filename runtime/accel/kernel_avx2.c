@@ -10,6 +10,7 @@
 #define TERRAIN_PACKET pl_terrain_packet_avx2
 #define PACKET_KERNEL pl_bvh_packet_avx2
 #define GATED_KERNEL pl_gated_trace_avx2
+#define GATED_PACKET pl_gated_packet_avx2
 
 #include "kernel_vector.h"
 
@@ -17,6 +18,7 @@
 #include "kernel_stream.h"
 #include "kernel_packet.h"
 #include "gated_kernel.h"
+#include "gated_packet.h"
 #include "terrain_kernel.h"
 #include "terrain_packet.h"
 #endif
