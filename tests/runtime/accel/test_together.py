@@ -169,6 +169,37 @@ def test_shadow_packets_share_their_steps():
         assert isa == "scalar" or count < 0.5 * tests["scalar"]
 
 
+CUT = [("menger", {"level": 9}), ("tree", {"order": 12}), ("menger_endless", {}), ("fern_endless", {}), ("mirrors", {})]
+
+
+@pytest.mark.parametrize("options", ANTIALIAS, ids=lambda options: options["antialias"])
+@pytest.mark.parametrize("name, parameters", CUT, ids=[name for name, _ in CUT])
+def test_company_does_not_show_where_details_are_cut(name, parameters, options):
+    """Each ray has a gate of its own: above the cut-off, near it, in shadows and behind mirrors."""
+    data = compile(ROOT / "scenes" / f"{name}.plsys", parameters=parameters)
+    for detail in (0.5, 4.0):
+        with Scene(data, accelerator="boxes", detail=detail) as scene:
+            expected, cut = scene.render(45, 35, channels=("color", "depth"), **options), scene.statistics["cut"]
+        for isa in available(data):
+            for items in (1, 21, 256):
+                with Scene(data, isa=isa, detail=detail, front_items=items, threads=1) as scene:
+                    together = scene.render(45, 35, channels=("color", "depth"), **options)
+                    assert scene.statistics["cut"] == cut, (detail, isa, items)
+                for channel, values in expected.items():
+                    np.testing.assert_array_equal(together[channel], values, err_msg=f"{detail} {isa} {items} {channel}")
+
+
+def test_packets_share_their_steps_where_details_are_cut():
+    data = compile(ROOT / "scenes" / "menger_endless.plsys")
+    tests = {}
+    for isa in available(data):
+        with Scene(data, isa=isa, threads=1) as scene:
+            scene.render(200, 150)
+            tests[isa] = scene.statistics["box_tests"]
+    for isa, count in tests.items():
+        assert isa == "scalar" or count < 0.7 * tests["scalar"]
+
+
 @pytest.mark.parametrize("count", [1, 16])
 def test_a_ray_along_a_cylinder_s_axis_and_beside_it_is_free(count):
     """It meets the cylinder's box, and its distance from the axis is all that tells."""
