@@ -12,14 +12,25 @@
 
 enum { LARGEST_ITEMS = 1024, LEAST_ITEMS = 4, RATIO = 4, DEFAULT_BYTES = 280 << 10 };
 
-/* A front's share of nodes an item, and of the smaller rungs that come with it. */
+/* Gates within a front are a few times smaller than its state: so many times what a thousandth of the scene takes, at one pixel
+ * of detail, a state must be large to have fronts. */
+#define WORTHY (2.0 / 1000.0)
+
+/* So many rounds find how large all states occur, unless chains of them are very long. */
+enum { MOST_ROUNDS = 64 };
+
+/* So much larger gates are worth a rung. */
+#define BETTER 1.1
+
+/* A front's share of nodes an item. */
 #define NODE_BYTES_AN_ITEM (sizeof(pl_front_node) / 5.0)
-#define RUNGS_OF_LARGEST (1.0 / (1.0 - 1.0 / RATIO))
 
 typedef struct building {
     pl_scene *scene;
     pl_gated *gated;
     pl_compositions *compositions;
+    const bool *worthy; /* which states may have large fronts */
+    size_t fixed;       /* bytes that don't depend on rungs */
     pl_error *error;
 } building;
 
@@ -161,17 +172,40 @@ static bool add_rung(building *b, uint32_t state, uint64_t most)
            set_gates(b, rung, (uint32_t)(gated->sums.opened - before));
 }
 
-/* The rungs of a state, the largest first. Those that hold no more than the next are left out. */
+/* Takes back the last rung. before: what there was without. */
+static void drop_rung(pl_gated *gated, const pl_fronts *sums, size_t bytes)
+{
+    pl_gated_rung *rung = &gated->rungs[--gated->count];
+    pl_front_free(&rung->front);
+    free((void *)rung->links);
+    gated->sums = *sums;
+    gated->bytes = bytes;
+}
+
+/* Whether rays hardly ever may enter a rung where they mayn't enter the larger one: its gates are about as small. */
+static bool is_no_better(const pl_gated_rung *rung, const pl_gated_rung *larger)
+{
+    return rung->least < BETTER * larger->least && rung->farthest < BETTER * larger->farthest;
+}
+
+/* The rungs of a state, the largest first. Those that hold no more than the next, or are no better than the one before, are
+ * left out. */
 static bool add_rungs(building *b, uint32_t index, uint64_t most)
 {
-    pl_gated_state *state = &b->gated->states[index];
+    pl_gated *gated = b->gated;
+    pl_gated_state *state = &gated->states[index];
     const pl_state *it = &b->scene->states.list[index];
     const pl_affine identity = pl_affine_identity();
     state->first = b->gated->count;
     state->diameter = it->bounds->diameter;
     state->unbounded = it->unbounded;
-    for (; most >= LEAST_ITEMS && most > it->item_count; most /= RATIO)
+    for (; most >= LEAST_ITEMS && most > it->item_count; most /= RATIO) {
+        const pl_fronts sums = gated->sums;
+        const size_t bytes = gated->bytes;
         if (!add_rung(b, index, most)) return false;
+        const pl_gated_rung *last = &gated->rungs[gated->count - 1];
+        if (gated->count > state->first + 1 && is_no_better(last, last - 1)) drop_rung(gated, &sums, bytes);
+    }
     if (!add_rung(b, index, 0)) return false;
     state->count = b->gated->count - state->first;
     const pl_gated_rung *first = &b->gated->rungs[state->first];
@@ -183,8 +217,49 @@ static bool add_rungs(building *b, uint32_t index, uint64_t most)
 
 /* --- the budget --- */
 
-/* Marks in `large` the states that fronts of `most` items lead to, from the scene's on; *bytes: what all rungs of those
- * will take, roughly. */
+/* How large each state occurs in the scene at most, of its own size: the product of stretches. Cycles shrink. */
+static bool find_stretches(const building *b, double *stretch)
+{
+    const pl_states *states = &b->scene->states;
+    bool grew = true;
+    stretch[0] = 1.0;
+    for (uint32_t round = 0; grew && round < MOST_ROUNDS; round++) {
+        grew = false;
+        for (uint32_t i = 0; i < states->count; i++)
+            for (uint32_t k = 0; k < states->list[i].item_count; k++) {
+                const pl_item *item = &states->list[i].items[k];
+                if (item->kind != PL_NODE_ENTER) continue;
+                double found = stretch[i];
+                for (uint32_t t = 0; t < item->transform_count; t++) found *= item->transforms[t]->stretch;
+                if (!(found > stretch[item->what] * (1.0 + 0x1p-20))) continue;
+                stretch[item->what] = found;
+                grew = true;
+            }
+    }
+    return !grew;
+}
+
+/* The states that are large enough for fronts: in a picture that shows the whole scene, gates within them may be open. */
+static bool *find_worthy(const building *b)
+{
+    const pl_states *states = &b->scene->states;
+    const double least = WORTHY * b->scene->detail * states->list[0].bounds->diameter;
+    double *stretch = calloc(states->count, sizeof *stretch);
+    bool *worthy = calloc(states->count, sizeof *worthy);
+    if (stretch && worthy) {
+        const bool known = find_stretches(b, stretch);
+        for (uint32_t i = 0; i < states->count; i++)
+            worthy[i] = !known || states->list[i].unbounded || !(stretch[i] * states->list[i].bounds->diameter < least);
+    } else {
+        free(worthy);
+        worthy = NULL;
+    }
+    free(stretch);
+    return worthy;
+}
+
+/* Marks in `large` the worthy states that fronts of `most` items lead to, from the scene's on; *bytes: what
+ * those fronts take at least. */
 static bool follow(const building *b, uint64_t most, bool *large, double *bytes)
 {
     pl_state_list reached = {0};
@@ -194,19 +269,18 @@ static bool follow(const building *b, uint64_t most, bool *large, double *bytes)
     memset(large, 0, b->scene->states.count * sizeof *large);
     *bytes = 0.0;
     for (; ok; state = reached.list[done++]) {
-        if (!large[state]) {
+        if (!large[state] && b->worthy[state]) {
             pl_front_counts counts;
             large[state] = true;
             ok = pl_front_count(b->compositions, state, most, &counts, &reached, b->error);
             *bytes += sizeof(pl_gated_rung) + (double)counts.primitives * sizeof(pl_front_primitive) +
-                      (double)counts.instances * (pl_front_instance_bytes(true) + sizeof(pl_gated_link)) +
+                      (double)counts.instances * (pl_front_instance_bytes(false) + sizeof(pl_gated_link)) +
                       (double)counts.opened * sizeof(pl_opened) +
                       (double)(counts.primitives + counts.instances) * NODE_BYTES_AN_ITEM;
         }
         if (done == reached.count) break;
     }
     free(reached.list);
-    *bytes *= RUNGS_OF_LARGEST;
     return ok;
 }
 
@@ -219,46 +293,73 @@ static double least_bytes(const pl_states *states)
     return bytes;
 }
 
-/* The largest K whose rungs fit, and the states that have them. */
-static bool plan(building *b, bool *large, uint64_t *most)
+/* What may be taken beside the states. */
+static double budget_of(const pl_scene *scene)
+{
+    const double used = (double)scene->states.bytes;
+    if (scene->options.memory) return (double)scene->options.memory - used;
+    /* What has no end looks alike at every scale: small fronts do for it. */
+    return scene->states.list[0].endless ? 4.0 * used : fmax(DEFAULT_BYTES - used, used);
+}
+
+/* Builds all rungs, in the place of others. */
+static bool build_rungs(building *b, const bool *large, uint64_t most)
+{
+    pl_gated *gated = b->gated;
+    while (gated->count) {
+        pl_gated_rung *rung = &gated->rungs[--gated->count];
+        pl_front_free(&rung->front);
+        free((void *)rung->links);
+    }
+    gated->bytes = b->fixed;
+    gated->sums = (pl_fronts){.limit_items = most};
+    for (uint32_t i = 0; i < b->scene->states.count; i++)
+        if (!add_rungs(b, i, large[i] ? most : 0)) return false;
+    return true;
+}
+
+/* The largest K whose rungs fit. large: working memory. */
+static bool choose_rungs(building *b, bool *large)
 {
     const pl_options *options = &b->scene->options;
-    double bytes, used = (double)b->scene->states.bytes, least = least_bytes(&b->scene->states);
-    /* What has no end looks alike at every scale: small fronts do for it. */
-    const double unasked = b->scene->states.list[0].endless ? 1.25 * used : fmax(DEFAULT_BYTES - used, used);
-    *most = options->front_items > LARGEST_ITEMS ? LARGEST_ITEMS : options->front_items;
-    if (*most) return follow(b, *most, large, &bytes);
-    const double budget = options->memory ? (double)options->memory - used : unasked;
+    const double budget = budget_of(b->scene), least = least_bytes(&b->scene->states);
+    uint64_t most = options->front_items > LARGEST_ITEMS ? LARGEST_ITEMS : options->front_items;
+    double bytes;
+    if (most) return follow(b, most, large, &bytes) && build_rungs(b, large, most);
     if (options->memory && least > budget)
         return pl_fail(b->error, PL_ERROR_LIMIT, "memory", "this scene needs at least %.0f KB; %.0f KB are allowed",
-                       (used + least) / 1024.0 + 1.0, (double)options->memory / 1024.0);
-    for (*most = LARGEST_ITEMS; *most >= LEAST_ITEMS; *most /= 2) {
-        if (!follow(b, *most, large, &bytes)) return false;
-        if (bytes + least <= budget) return true;
+                       ((double)b->scene->states.bytes + least) / 1024.0 + 1.0, (double)options->memory / 1024.0);
+    for (most = LARGEST_ITEMS; most >= LEAST_ITEMS; most /= 2) {
+        if (!follow(b, most, large, &bytes)) return false;
+        if (bytes > budget) continue;
+        if (!build_rungs(b, large, most)) return false;
+        const pl_gated *gated = b->gated;
+        const size_t taken = gated->sums.node_bytes + gated->sums.item_bytes + gated->bytes + gated->count * sizeof *gated->rungs;
+        if ((double)taken <= budget) return true;
     }
-    *most = 0;
-    return true;
+    memset(large, 0, b->scene->states.count * sizeof *large);
+    return build_rungs(b, large, 0);
 }
 
 bool pl_gated_build(pl_scene *scene, pl_error *error)
 {
     const uint32_t count = scene->states.count;
     pl_gated *gated = calloc(1, sizeof *gated);
-    building b = {scene, gated, pl_compositions_create(&scene->states, error), error};
+    building b = {.scene = scene, .gated = gated, .compositions = pl_compositions_create(&scene->states, error), .error = error};
     bool *large = calloc(count, sizeof *large), ok = b.compositions != NULL;
-    uint64_t most = 0;
     scene->structure = gated;
-    if (ok && (!gated || !large || !(gated->states = calloc(count, sizeof *gated->states))))
+    if (ok && (!gated || !large || !(gated->states = calloc(count, sizeof *gated->states)) || !(b.worthy = find_worthy(&b))))
         ok = pl_fail_memory(error, "building the rungs");
-    ok = ok && find_nested(&b) && plan(&b, large, &most);
-    for (uint32_t i = 0; ok && i < count; i++) ok = add_rungs(&b, i, large[i] ? most : 0);
+    ok = ok && find_nested(&b);
+    if (ok) b.fixed = gated->bytes + sizeof *gated + count * sizeof *gated->states;
+    ok = ok && choose_rungs(&b, large);
     pl_compositions_free(b.compositions);
     free(large);
+    free((void *)b.worthy);
     if (!ok) return false;
     pl_gated_rung *exact = realloc(gated->rungs, gated->count * sizeof *exact);
     if (exact) gated->rungs = exact, gated->capacity = gated->count;
-    gated->sums.limit_items = most;
-    gated->bytes += sizeof *gated + count * sizeof *gated->states + gated->capacity * sizeof *gated->rungs;
+    gated->bytes += gated->capacity * sizeof *gated->rungs;
     return true;
 }
 

@@ -44,32 +44,61 @@ static passage packet_passage(const pl_packet_frame *f)
                      f->t0 + (double)wide_most(most) * (1.0 + 0x1p-16) * over};
 }
 
-/* The rays of some lanes of frame `index` one by one through an instance. */
-static bool gated_one_by_one(pl_tracer *tracer, uint32_t index, uint32_t instance, unsigned lanes, gated_crowd *c)
+/* The rays of some lanes one by one through frame `index` > 0 and what lies below. passed: its gate is open, and the rung chosen. */
+static bool gated_one_by_one(pl_tracer *tracer, uint32_t index, unsigned lanes, enum course course, bool passed, gated_crowd *c)
 {
     pl_gated_work *w = tracer->work;
+    const pl_gated *gated = tracer->scene->structure;
+    const pl_gated_state *state = &gated->states[w->frames[index].at.front->state];
+    const pl_gated_rung *rung = passed ? w->frames[index].rung : &gated->rungs[state->first];
+    const double to = passed ? w->frames[index].to : w->frames[index - 1].to;
     for (; lanes; lanes &= lanes - 1) {
         const pl_packet_frame *from = &w->packets->packets[index];
-        pl_frame *f = &w->frames[index].at; /* which may have moved */
-        const unsigned lane = w->lane = (unsigned)__builtin_ctz(lanes);
-        pl_query *query = &c->queries[lane];
-        for (int axis = 0; axis < 3; axis++) {
-            f->o[axis] = from->o[axis][lane];
-            f->d[axis] = from->d[axis][lane];
-        }
-        f->error = from->error;
-        f->distance = from->distance;
-        f->t0 = from->t0;
-        f->rate = from->rate;
-        f->blind = false;
-        float t_max = from->t_max[lane];
-        const int entered = gated_descend(tracer, index, instance, query, &t_max);
-        if (entered < 0) return false;
-        if (entered > 0 && !(c->any ? gated_visit(tracer, index + 1, query, entered == 1, true)
-                                    : gated_visit(tracer, index + 1, query, entered == 1, false)))
+        pl_gated_frame *f = &w->frames[index]; /* which may have moved */
+        pl_query *query = &c->queries[w->lane = (unsigned)__builtin_ctz(lanes)];
+        bool met = true, open = true;
+        f->rung = rung;
+        f->to = to;
+        f->at.front = &rung->front;
+        f->at.error = from->error;
+        f->at.distance = from->distance;
+        f->at.t0 = from->t0;
+        f->at.rate = from->rate;
+        if (course == ONE_BY_ONE) begin_alone(&f->at, from, (int)w->lane);
+        else if (!begin_apart(&f->at, from, (int)w->lane, query->t_max, &met) && !state->unbounded) continue;
+        if (!passed && !gated_enter(tracer, index - 1, state, query, &open)) return false;
+        if (open && !query->done &&
+            !(c->any ? gated_visit(tracer, index, query, met, true) : gated_visit(tracer, index, query, met, false)))
             return false;
-        gated_note(w->packets, c, lane);
+        gated_note(w->packets, c, w->lane);
     }
+    return true;
+}
+
+/* A ray by itself from frame `index` into an instance, and through what lies below. */
+static bool gated_lone(pl_tracer *tracer, uint32_t index, uint32_t instance, gated_crowd *c)
+{
+    pl_gated_work *w = tracer->work;
+    const pl_packet_frame *from = &w->packets->packets[index];
+    const unsigned lane = w->lane;
+    pl_frame *f = &w->frames[index].at;
+    pl_query *query = &c->queries[lane];
+    for (int axis = 0; axis < 3; axis++) {
+        f->o[axis] = from->o[axis][lane];
+        f->d[axis] = from->d[axis][lane];
+    }
+    f->error = from->error;
+    f->distance = from->distance;
+    f->t0 = from->t0;
+    f->rate = from->rate;
+    f->blind = false;
+    float t_max = from->t_max[lane];
+    const int entered = gated_descend(tracer, index, instance, query, &t_max);
+    if (entered < 0) return false;
+    if (entered > 0 && !(c->any ? gated_visit(tracer, index + 1, query, entered == 1, true)
+                                : gated_visit(tracer, index + 1, query, entered == 1, false)))
+        return false;
+    gated_note(w->packets, c, lane);
     return true;
 }
 
@@ -117,10 +146,11 @@ static inline bool gated_descend_lanes(pl_tracer *tracer, uint32_t index, uint32
                                        bool *goes_on)
 {
     pl_gated_work *w = tracer->work;
-    const uint32_t entered = w->frames[index].at.front->instances[instance].front & ~PL_NO_SHADOW;
     *goes_on = false;
-    if (__builtin_popcount(lanes) <= FEW || ((const pl_gated *)tracer->scene->structure)->states[entered].unbounded)
-        return gated_one_by_one(tracer, index, instance, lanes, c);
+    if (!(lanes & (lanes - 1))) {
+        w->lane = (unsigned)__builtin_ctz(lanes);
+        return gated_lone(tracer, index, instance, c);
+    }
     if (index + 1 >= w->frame_capacity && !pl_gated_grow_frames(w, index + 1, c->queries->error)) return false;
     if (!pl_bvh_grow_packets(w->packets, index + 1, c->queries->error)) return false;
     const pl_packet_frame *parent = &w->packets->packets[index];
@@ -131,13 +161,14 @@ static inline bool gated_descend_lanes(pl_tracer *tracer, uint32_t index, uint32
     f->each = true;
     tracer->counters.instances++;
     descend_lanes(f, parent, &parent->front->instances[instance], lanes);
+    if (state->unbounded) return gated_one_by_one(tracer, index + 1, lanes, APART, false, c);
     f->answers = w->packets->answers;
     const enum course course = begin_lanes(f, lanes, c->t_max);
     if (course == ASTRAY) return true;
-    if (course != TOGETHER) return gated_one_by_one(tracer, index, instance, f->lanes, c);
+    if (course != TOGETHER) return gated_one_by_one(tracer, index + 1, f->lanes, course, false, c);
     if (!gated_pass(tracer, index + 1, state, c)) return false;
     if (c->any) f->lanes = lanes_left(c->queries, f->lanes);
-    if (!f->lanes) return true;
+    if (__builtin_popcount(f->lanes) <= FEW) return gated_one_by_one(tracer, index + 1, f->lanes, ONE_BY_ONE, true, c);
     if (f->answers != w->packets->answers) set_t_max(f, c->t_max);
     f->answers = w->packets->answers;
     look_at_each(f);

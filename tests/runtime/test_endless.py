@@ -93,6 +93,19 @@ def test_how_far_fronts_are_unfolded_changes_no_cut(name):
         assert other["cut"] == counts["cut"]
 
 
+def test_memory_bounds_the_fronts_of_a_scene_with_a_cut_off():
+    data = build(SCENES / "menger.plsys", parameters={"level": 10}).encode()
+    taken = []
+    for memory in (100_000, 150_000, 300_000, 1_000_000):
+        with Scene(data, detail=1, memory=memory) as scene:
+            counts = scene.statistics
+        taken.append(counts["scene_bytes"] - counts["bytes"]["program"])
+        assert taken[-1] <= memory
+    assert taken == sorted(taken) and taken[-1] > 2 * taken[0]
+    with Scene(data, detail=1) as scene:
+        assert scene.statistics["scene_bytes"] < 300_000
+
+
 def test_finite_scenes_are_not_cut_unless_asked():
     data = build(SCENES / "tree.plsys").encode()
     plain, counts = picture(data, 32)
