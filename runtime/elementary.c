@@ -2,8 +2,8 @@
  *
  * Method: arguments are reduced exactly, the function is evaluated as an unevaluated sum of two doubles
  * ("double-double": Dekker 1971) with a relative error below 2^-62, and rounded once. Of each Taylor series only the
- * leading terms need double-double; the rest, small enough, is a Horner scheme in double. Sources: Muller et al.,
- * Handbook of Floating-Point Arithmetic, chapters 4, 5 and 11. */
+ * leading terms need double-double; the rest, small enough, is a Horner scheme in double. Sine and cosine are looked up
+ * (circular.h). Sources: Muller et al., Handbook of Floating-Point Arithmetic, chapters 4, 5 and 11. */
 #include "elementary.h"
 
 #include <math.h>
@@ -53,9 +53,18 @@ static inline pair add(pair a, pair b)
     return fast_two_sum(high.high, high.low + low.low);
 }
 
-#define NAME(function) function
-#include "circular.h"
-#undef NAME
+/* a * b exactly, where nothing over- or underflows. */
+static inline pair two_product(double a, double b)
+{
+    const double product = a * b, a1 = upper(a), b1 = upper(b), a2 = a - a1, b2 = b - b1;
+    return (pair){product, ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2};
+}
+
+static inline pair multiply(pair a, pair b)
+{
+    const pair p = two_product(a.high, b.high);
+    return fast_two_sum(p.high, p.low + (a.high * b.low + a.low * b.high));
+}
 
 static inline pair scale_by(pair a, double b)
 {
@@ -85,6 +94,8 @@ static inline pair negate(pair a)
 {
     return (pair){-a.high, -a.low};
 }
+
+#include "circular.h"
 
 /* --- exponents --- */
 
@@ -162,29 +173,6 @@ static double scaled(double a, pair constant)
     return join(scale_by(constant, mantissa), exponent);
 }
 
-/* The same bits in a third of the time where there is an instruction for a * b + c, rounded once. */
-#ifdef __x86_64__
-#define NAME(function) function##_fused
-#define FUSED
-#pragma GCC push_options
-#pragma GCC target("fma")
-#include "circular.h"
-#pragma GCC pop_options
-#undef FUSED
-#undef NAME
-#endif
-
-static void sine_and_cosine(pair x, pair *s, pair *c)
-{
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("fma")) {
-        circle_fused(x, s, c);
-        return;
-    }
-#endif
-    circle(x, s, c);
-}
-
 /* degrees = 360 n + 90 * quadrant + rest exactly, |rest| <= 45. Every step is exact (fmod; Sterbenz for the
  * difference). */
 static double reduce(double degrees, int *quadrant)
@@ -209,8 +197,7 @@ double pl_sin(double degrees)
         const double small = rest == 0 ? 0 : scaled(rest, RADIANS);
         return rest == 0 ? copysign(0, degrees) : quadrant == 2 ? -small : small;
     }
-    const pair x = scale_by(RADIANS, rest);
-    result = quadrant % 2 ? cosine(x) : sine(x);
+    result = quadrant % 2 ? cosine(rest) : sine(rest);
     return quadrant >= 2 ? -result.high - result.low : result.high + result.low;
 }
 
@@ -224,8 +211,7 @@ double pl_cos(double degrees)
         return 0;
     if (quadrant % 2 == 0 && fabs(rest) < TINY)
         return quadrant == 2 ? -1 : 1;
-    const pair x = scale_by(RADIANS, rest);
-    const pair result = quadrant % 2 ? sine(x) : cosine(x);
+    const pair result = quadrant % 2 ? sine(rest) : cosine(rest);
     return quadrant == 1 || quadrant == 2 ? -result.high - result.low : result.high + result.low;
 }
 
@@ -239,7 +225,7 @@ void pl_sin_cos(double degrees, double *sin_, double *cos_)
         return;
     }
     pair s, c;
-    sine_and_cosine(scale_by(RADIANS, rest), &s, &c);
+    sine_and_cosine(rest, &s, &c);
     const double a = s.high + s.low, b = c.high + c.low;
     *sin_ = quadrant == 0 ? a : quadrant == 1 ? b : quadrant == 2 ? -a : -b;
     *cos_ = quadrant == 0 ? b : quadrant == 1 ? -a : quadrant == 2 ? -b : a;
@@ -255,7 +241,8 @@ double pl_tan(double degrees)
         return quadrant % 2 ? copysign(INFINITY, pl_sin(degrees)) : copysign(0, degrees);
     if (quadrant % 2 == 0 && fabs(rest) < TINY)
         return scaled(rest, RADIANS);
-    const pair x = scale_by(RADIANS, rest), s = sine(x), c = cosine(x);
+    pair s, c;
+    sine_and_cosine(rest, &s, &c);
     const pair result = quadrant % 2 ? divide(negate(c), s) : divide(s, c);
     return result.high + result.low;
 }
