@@ -25,9 +25,6 @@ static inline __attribute__((always_inline)) pl_span clip(const pl_box *box, con
     return within;
 }
 
-/* Sums of coordinates are as far off as these together, and round. */
-#define BEVEL_SLACK 4.0
-
 /* Bevels in pairs: v along x + y and x - y, and so on, in their order. */
 typedef double pair __attribute__((vector_size(16)));
 typedef long long pair_mask __attribute__((vector_size(16)));
@@ -60,7 +57,7 @@ static inline __attribute__((always_inline)) pl_span clip_bevels(const pl_gate_b
                                                                  double slack, pl_span within)
 {
     pair at[PAIRS], along[PAIRS], enter = {within.enter, within.enter}, leave = {within.leave, within.leave};
-    const double room = BEVEL_SLACK * slack;
+    const double room = PL_BEVEL_SLACK * slack;
     pairs_along(o, at);
     pairs_along(d, along);
     for (int i = 0; i < PAIRS; i++) {

@@ -39,6 +39,9 @@ typedef struct pl_footprint {
     double width, spread, skip;
 } pl_footprint;
 
+/* Along bevels slack is so many times as large: sums of coordinates are as far off as these together, and round. */
+#define PL_BEVEL_SLACK 4.0
+
 /* Of t, in which a ray is within the boxes of the instances passed so far. */
 typedef struct pl_span {
     double enter, leave;

@@ -3,6 +3,7 @@
 #pragma GCC target("avx2,fma,bmi,bmi2,lzcnt,popcnt")
 
 #include "bvh.h"
+#include "lazy.h"
 
 #define KERNEL pl_bvh_trace_avx2
 #define STREAM_KERNEL pl_bvh_stream_avx2
@@ -10,6 +11,7 @@
 #define TERRAIN_PACKET pl_terrain_packet_avx2
 #define PACKET_KERNEL pl_bvh_packet_avx2
 #define GATED_KERNEL pl_gated_trace_avx2
+#define LAZY_KERNEL pl_lazy_kernel_avx2
 #define GATED_PACKET pl_gated_packet_avx2
 
 #include "kernel_vector.h"
@@ -21,4 +23,5 @@
 #include "gated_packet.h"
 #include "terrain_kernel.h"
 #include "terrain_packet.h"
+#include "lazy_kernel.h"
 #endif

@@ -4,11 +4,13 @@
 #pragma GCC target("avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi,bmi2,lzcnt,popcnt")
 
 #include "bvh.h"
+#include "lazy.h"
 
 #define KERNEL pl_bvh_trace_avx512
 #define STREAM_KERNEL pl_bvh_stream_avx512
 #define TERRAIN_KERNEL pl_terrain_trace_avx512
 #define GATED_KERNEL pl_gated_trace_avx512
+#define LAZY_KERNEL pl_lazy_kernel_avx512
 
 #include "kernel_vector.h"
 
@@ -16,4 +18,5 @@
 #include "kernel_stream.h"
 #include "gated_kernel.h"
 #include "terrain_kernel.h"
+#include "lazy_kernel.h"
 #endif

@@ -83,6 +83,7 @@ static inline __attribute__((always_inline)) bool shape_interval(uint32_t kind, 
 
 /* Four numbers at once: a vector and one that means nothing. */
 typedef double double4 __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t long4 __attribute__((vector_size(32), aligned(8), may_alias));
 typedef float float4 __attribute__((vector_size(16), aligned(4), may_alias));
 typedef int32_t int4 __attribute__((vector_size(16), aligned(4), may_alias));
 

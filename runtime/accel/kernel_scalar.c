@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "bvh.h"
+#include "lazy.h"
 
 /* Vectors of four doubles are lowered to what there is; they don't leave this file. */
 #pragma GCC diagnostic ignored "-Wpsabi"
@@ -10,6 +11,7 @@
 #define STREAM_KERNEL pl_bvh_stream_scalar
 #define TERRAIN_KERNEL pl_terrain_trace_scalar
 #define GATED_KERNEL pl_gated_trace_scalar
+#define LAZY_KERNEL pl_lazy_kernel_scalar
 
 #define wide_end() ((void)0)
 #define four_fma(a, b, c) ((a) * (b) + (c))
@@ -102,3 +104,30 @@ static inline unsigned wide_order(wide enter, wide leave, const pl_ref *child, u
 #include "kernel_stream.h"
 #include "gated_kernel.h"
 #include "terrain_kernel.h"
+
+/* The second where one is NaN. */
+static inline double4 double4_max(double4 a, double4 b)
+{
+    for (int i = 0; i < 4; i++) a[i] = a[i] > b[i] ? a[i] : b[i];
+    return a;
+}
+
+static inline double4 double4_min(double4 a, double4 b)
+{
+    for (int i = 0; i < 4; i++) a[i] = a[i] < b[i] ? a[i] : b[i];
+    return a;
+}
+
+static inline double4 double4_root(double4 a)
+{
+    for (int i = 0; i < 4; i++) a[i] = sqrt(a[i]);
+    return a;
+}
+
+/* A bit for each true one of a comparison. */
+static inline uint32_t double4_bits(long4 c)
+{
+    return (uint32_t)((c[0] & 1) | (c[1] & 2) | (c[2] & 4) | (c[3] & 8));
+}
+
+#include "lazy_kernel.h"

@@ -13,6 +13,10 @@ typedef __m256 wide;
 #define four_min(a, b) ((float4)_mm_min_ps((__m128)(a), (__m128)(b)))
 #define four_max(a, b) ((float4)_mm_max_ps((__m128)(a), (__m128)(b)))
 #define four_fma(a, b, c) ((double4)_mm256_fmadd_pd((__m256d)(a), _mm256_set1_pd(b), (__m256d)(c)))
+#define double4_max(a, b) ((double4)_mm256_max_pd((__m256d)(a), (__m256d)(b))) /* the second where one is NaN */
+#define double4_min(a, b) ((double4)_mm256_min_pd((__m256d)(a), (__m256d)(b)))
+#define double4_root(a) ((double4)_mm256_sqrt_pd((__m256d)(a)))
+#define double4_bits(comparison) ((uint32_t)_mm256_movemask_pd((__m256d)(comparison)))
 /* Code of other instruction sets that follows would wait for the upper halves of registers; compilers forget this where
  * vectors are arguments. */
 #define wide_end() _mm256_zeroupper()

@@ -1,8 +1,10 @@
 /* lazy.c - bvh where there are too many states to build: they are unfolded when a ray comes to them (lazy.h).
  *
- * A frame is an instance on the way from the root, with its state; an entry of the stack is an item of a frame that is
- * still to be visited. Entries are visited depth first, near ones first, so frames form a stack as well. Boxes only
- * filter, so neither what is in the cache nor how loose the classes' boxes are shows in a hit.
+ * Rays go together, up to PL_TRACE_MANY of them: a frame is an instance on the way from the root, with its state and the rays that
+ * came into it; an entry of the stack is an item of a frame that is still to be visited, with the rays that meet it. Entries
+ * are visited depth first, those that a ray meets first first, so frames form a stack as well. Boxes only filter, so neither what is
+ * in the cache nor how loose the classes' boxes are shows in a hit, nor with which others a ray went. Boxes and gates are
+ * tested four rays at a time (lazy_kernel.h).
  *
  * With a cut-off nearly all gates are clearly open: larger than the footprint where the ray leaves the box. Spans (cut.h)
  * and hashes of paths are found only where one isn't. */
@@ -19,44 +21,46 @@
 #define MOST_WORK (UINT64_C(1) << 24)
 enum { MOST_UNKNOWN = PL_LIMIT_DEPTH + 1024 };
 
-/* A ray in the frame of an instance. */
-typedef struct place {
-    double o[3], d[3];
-    double stretch; /* with cut-offs: the product of stretches */
-    double leave;   /* with cut-offs: from there on nothing stands below */
-} place;
-
 /* Frames are the instances on one path from the root, so frame i is the parent of frame i + 1. */
 typedef struct frame {
     pl_lazy_state *state; /* NULL: its half of the cache is gone */
     uint32_t symbol, terms; /* terms on the path up to here */
     uint32_t item;          /* of the frame before, by which this one was reached */
-    bool spanned;           /* `inside` is known */
-    place at;
-    pl_span inside; /* with cut-offs: of what stands below */
+    uint32_t slot;          /* of its rays … */
+    uint32_t rays;          /* … which of them came here … */
+    uint32_t spanned;       /* … and whose `inside` is known */
+    double stretch;         /* with cut-offs: the product of stretches */
 } frame;
 
-/* An item that is still to be visited. With cut-offs a ray has gone as far as the gates of those that enter states: these say
- * more than boxes would, and most boxes that it meets have gates that it meets. */
+/* An item that is still to be visited. With cut-offs rays have gone as far as the gates of those that enter states: these say
+ * more than boxes would, and most boxes that they meet have gates that they meet. */
 typedef struct pending {
-    double t_entry;
-    uint32_t frame, item;
-    bool arrived; /* `at` is known … */
-    bool open;    /* … and the gate is clearly open */
-    place at;
+    double t_entry; /* the least of its rays' */
+    double stretch;
+    uint32_t frame, item, slot;
+    uint32_t rays; /* that meet it … */
+    uint32_t open; /* … and those for which the gate is clearly open */
+    bool arrived;  /* rays have been mapped into the instance's frame */
 } pending;
 
 typedef struct work {
     pl_unfolder *unfolder;
     pl_lazy_half *half;
-    pl_footprint footprint; /* the query's; without a cut-off 0: then all gates are clearly open */
+    const pl_lazy_kernel *kernel;
+    pl_query *queries;
+    pl_lazy_wants wants;
+    uint32_t fours, all; /* of rays, and all of these */
     frame *frames;
+    pl_span *inside; /* with cut-offs: of what stands below a frame, for each ray of the fours */
     pending *stack;
     uint64_t *scopes;
+    pl_lazy_four *slots; /* `fours` each … */
+    uint32_t *free_slots; /* … of which these aren't used */
     pl_path path; /* to the last frame */
-    size_t frame_count, frame_capacity, stack_count, stack_capacity, scope_capacity;
+    size_t frame_count, frame_capacity, inside_capacity, stack_count, stack_capacity, scope_capacity;
+    size_t slot_count, slot_capacity, free_count, free_capacity;
     size_t scope_words;
-    uint64_t spent, found; /* for this ray */
+    uint64_t spent, found; /* for these rays */
     uint32_t unknown, changes; /* of the half */
 } work;
 
@@ -66,10 +70,24 @@ static void work_destroy(void *memory)
     if (!w) return;
     pl_unfolder_free(w->unfolder);
     free(w->frames);
+    free(w->inside);
     free(w->stack);
     free(w->scopes);
+    free(w->slots);
+    free(w->free_slots);
     free(w->path.terms);
     free(w);
+}
+
+static const pl_lazy_kernel *kernel_of(const pl_scene *scene)
+{
+    switch (scene->isa) {
+#ifdef __x86_64__
+    case PL_ISA_AVX512: return &pl_lazy_kernel_avx512;
+    case PL_ISA_AVX2: return &pl_lazy_kernel_avx2;
+#endif
+    default: return &pl_lazy_kernel_scalar;
+    }
 }
 
 static void *work_create(const pl_scene *scene, pl_error *error)
@@ -77,6 +95,7 @@ static void *work_create(const pl_scene *scene, pl_error *error)
     work *w = calloc(1, sizeof *w);
     if (w && (w->unfolder = pl_unfolder_create(scene, error))) {
         w->scope_words = pl_scope_words(scene->program, &(pl_scope){.draws = 0});
+        w->kernel = kernel_of(scene);
         return w;
     }
     free(w);
@@ -95,61 +114,70 @@ static bool grow(void *array, size_t count, size_t *capacity, size_t element, pl
     return true;
 }
 
-/* Whether a gate so large is open wherever on the ray it is met up to `to`; in the order of pl_gate_at's roundings. */
-static inline bool is_open(const work *w, double size, double to)
+/* --- rays --- */
+
+static inline pl_lazy_four *rays_at(const work *w, uint32_t slot)
 {
-    return size > w->footprint.width + w->footprint.spread * to;
+    return w->slots + (size_t)slot * w->fours;
 }
 
-/* [t_min, t_max] within a box with some room; nothing if `enter` > `leave`. */
-static inline pl_span clip(const pl_slab *slab, const float planes[6], double room, double t_min, double t_max)
+static inline pl_span *inside_of(const work *w, size_t index, uint32_t ray)
 {
-    pl_span span = {t_min, t_max};
-    for (int axis = 0; axis < 3; axis++) {
-        const double lo = (double)planes[axis] - room, hi = (double)planes[3 + axis] + room;
-        const double t_near = ((slab->negative[axis] ? hi : lo) - slab->near_origin[axis]) * slab->inverse[axis];
-        const double t_far = ((slab->negative[axis] ? lo : hi) - slab->far_origin[axis]) * slab->inverse[axis];
-        span.enter = t_near > span.enter ? t_near : span.enter;
-        span.leave = t_far < span.leave ? t_far : span.leave;
+    return w->inside + index * 4 * w->fours + ray;
+}
+
+/* Room for rays; pointers to others' end. */
+static bool take_slot(work *w, uint32_t *slot, pl_error *error)
+{
+    if (w->free_count) {
+        *slot = w->free_slots[--w->free_count];
+        return true;
     }
-    return span;
+    *slot = (uint32_t)w->slot_count;
+    if (!grow(&w->slots, (w->slot_count + 1) * w->fours, &w->slot_capacity, sizeof *w->slots, error) ||
+        !grow(&w->free_slots, w->slot_count, &w->free_capacity, sizeof *w->free_slots, error))
+        return false;
+    w->slot_count++;
+    return true;
 }
 
-/* How far out of a box that holds primitives what is cut may stand that is drawn instead of some of them: it is no larger than a
- * footprint. */
-static inline double room_of(const work *w, const place *at)
+static inline void give_slot(work *w, uint32_t slot)
 {
-    const double footprint = w->footprint.width + (w->footprint.spread > 0.0 ? w->footprint.spread * at->leave : 0.0);
-    return footprint / at->stretch * (1.0 + 0x1p-20);
+    w->free_slots[w->free_count++] = slot;
 }
+
+/* One of the rays at a slot. */
+static inline void take_ray(const work *w, uint32_t slot, uint32_t ray, double o[3], double d[3])
+{
+    const pl_lazy_four *four = rays_at(w, slot) + ray / 4;
+    for (int axis = 0; axis < 3; axis++) {
+        o[axis] = four->o[axis][ray % 4];
+        d[axis] = four->d[axis][ray % 4];
+    }
+}
+
+/* After a leaf was offered: what the ray still wants. */
+static inline void update(work *w, uint32_t ray)
+{
+    w->wants.t_max[ray] = w->queries[ray].done ? -INFINITY : w->queries[ray].t_max;
+    if (w->queries[ray].done) w->all &= ~(UINT32_C(1) << ray);
+}
+
+/* The first of some rays, which is left out of them. */
+static inline uint32_t next_ray(uint32_t *rays)
+{
+    const uint32_t ray = (uint32_t)__builtin_ctz(*rays);
+    *rays &= *rays - 1;
+    return ray;
+}
+
+/* --- items --- */
 
 /* Asks for a state's memory before the ray comes to it: what stands near the bottom of a tree is in no cache. */
 static inline void fetch(const pl_lazy_state *state)
 {
     if (!state) return;
     for (int line = 0; line < 5; line++) __builtin_prefetch((const char *)state + 64 * line);
-}
-
-static inline void map_down(const pl_lazy_item *it, place *at)
-{
-    for (uint32_t i = 0; i < it->transform_count; i++) pl_map_ray(it->transforms[i], at->o, at->d);
-}
-
-/* Goes as far as the gate of an item that enters a state. false: it is missed. */
-static inline bool arrive(const work *w, const pl_lazy_item *it, const pl_query *query, pending *next)
-{
-    const pl_gate_box *gate = it->gate;
-    const double *stretches = pl_lazy_stretches(it);
-    map_down(it, &next->at);
-    for (uint32_t i = 0; i < it->transform_count; i++) next->at.stretch *= stretches[i];
-    next->arrived = next->open = true;
-    if (gate->unbounded) return true;
-    const pl_span own = pl_gate_span(gate, next->at.o, next->at.d, (pl_span){query->t_min, query->t_max});
-    if (!(own.enter <= own.leave)) return false;
-    next->t_entry = own.enter;
-    next->at.leave = own.leave;
-    next->open = is_open(w, gate->diameter * next->at.stretch, own.leave);
-    return true;
 }
 
 /* Puts what was written behind the stack's last entry into its place among those from `first` on, the nearest last. */
@@ -162,35 +190,48 @@ static inline void insert(work *w, size_t first)
     w->stack[place] = next;
 }
 
-/* Pushes the items that the ray meets. */
-static bool push_items(work *w, uint32_t index, bool gates, pl_query *query, pl_counters *counters)
+/* Goes with a frame's rays as far as an item of its state; those that miss it are left out. */
+static void approach(const work *w, const frame *f, const pl_lazy_item *it, bool gates, pending *next, pl_counters *counters)
 {
-    const place *from = &w->frames[index].at;
-    const pl_lazy_state *state = w->frames[index].state;
+    const pl_lazy_four *from = rays_at(w, f->slot);
+    pl_lazy_four *to = rays_at(w, next->slot);
+    next->rays = f->rays;
+    next->arrived = false;
+    next->stretch = f->stretch;
+    const bool gated = gates && it->kind == PL_NODE_ENTER;
+    if (it->boxed) {
+        counters->box_tests += (unsigned)__builtin_popcount(next->rays);
+        next->rays = w->kernel->clip(it, &f->state->reach, f->stretch, &w->wants, from, to, next->rays, &next->t_entry);
+    } else if (!gated || it->gate->unbounded) {
+        next->t_entry = w->kernel->begin(&w->wants, to, next->rays);
+    }
+    if (next->rays && gated) {
+        const double *stretches = pl_lazy_stretches(it);
+        for (uint32_t i = 0; i < it->transform_count; i++) next->stretch *= stretches[i];
+        counters->box_tests += (unsigned)__builtin_popcount(next->rays);
+        next->arrived = true;
+        w->kernel->map(it, from, to, next->rays);
+        next->rays = w->kernel->meet(it->gate, next->stretch, &w->wants, from, to, next->rays, &next->open, &next->t_entry);
+    }
+}
+
+/* Pushes the items that rays meet. */
+static bool push_items(work *w, uint32_t index, bool gates, pl_counters *counters, pl_error *error)
+{
+    const frame *f = &w->frames[index];
     const size_t first = w->stack_count;
-    const pl_slab slab = pl_slab_of(from->o, from->d, pl_reach_slack(&state->reach, from->o));
-    for (uint32_t i = 0; i < state->item_count; i++) {
-        const pl_lazy_item *it = &state->items[i];
-        if (!grow(&w->stack, w->stack_count, &w->stack_capacity, sizeof *w->stack, query->error)) return false;
+    for (uint32_t i = 0; i < f->state->item_count; i++) {
+        const pl_lazy_item *it = &f->state->items[i];
+        uint32_t slot;
+        if (w->queries->shadow && it->no_shadow) continue;
+        if (!take_slot(w, &slot, error) || !grow(&w->stack, w->stack_count, &w->stack_capacity, sizeof *w->stack, error)) return false;
         pending *next = &w->stack[w->stack_count];
-        bool met = true;
-        if (query->shadow && it->no_shadow) continue;
-        next->t_entry = query->t_min;
         next->frame = index;
         next->item = i;
-        next->arrived = false;
-        if (it->boxed) {
-            const pl_span span = clip(&slab, it->box, it->whole ? 0.0 : room_of(w, from), query->t_min, query->t_max);
-            counters->box_tests++;
-            next->t_entry = span.enter;
-            met = it->box[0] <= it->box[3] && span.enter <= span.leave;
-        }
-        if (met && gates && it->kind == PL_NODE_ENTER) {
-            counters->box_tests++;
-            next->at = *from;
-            met = arrive(w, it, query, next);
-        }
-        if (!met) {
+        next->slot = slot;
+        approach(w, f, it, gates, next, counters);
+        if (!next->rays) {
+            give_slot(w, slot);
             if (index > counters->miss_depth) counters->miss_depth = index;
             continue;
         }
@@ -206,18 +247,20 @@ static bool fail_work(const pl_scene *scene, uint32_t symbol, const char *what, 
                       "work: one ray %s %llu, which is the limit; does the recursion end?", what, (unsigned long long)limit);
 }
 
-/* The span for what stands below a frame: each within that of the frame before. */
-static pl_span span_of(work *w, size_t index)
+/* A ray's span for what stands below a frame: each within that of the frame before. */
+static pl_span span_of(work *w, size_t index, uint32_t ray)
 {
+    const uint32_t bit = UINT32_C(1) << ray;
     size_t known = index;
-    while (!w->frames[known].spanned) known--;
+    while (!(w->frames[known].spanned & bit)) known--;
     for (size_t i = known + 1; i <= index; i++) {
         frame *f = &w->frames[i];
-        const pl_lazy_item *it = &w->frames[i - 1].state->items[f->item];
-        f->inside = pl_span_below(it->gate, f->at.o, f->at.d, w->frames[i - 1].inside);
-        f->spanned = true;
+        double o[3], d[3];
+        take_ray(w, f->slot, ray, o, d);
+        *inside_of(w, i, ray) = pl_span_below(w->frames[i - 1].state->items[f->item].gate, o, d, *inside_of(w, i - 1, ray));
+        f->spanned |= bit;
     }
-    return w->frames[index].inside;
+    return *inside_of(w, index, ray);
 }
 
 /* Keeps the scopes of frames that have states, by which they are found again: all are equally long, having no draws. */
@@ -236,7 +279,8 @@ static bool keep_scopes(work *w, pl_error *error)
 static bool change(pl_tracer *tracer, pl_error *error)
 {
     work *w = tracer->work;
-    if (tracer->scene->gates) span_of(w, w->frame_count - 1);
+    for (size_t i = 0; tracer->scene->gates && i < w->frame_count; i++)
+        for (uint32_t rays = w->frames[i].rays; rays;) span_of(w, i, next_ray(&rays));
     if (!keep_scopes(w, error)) return false;
     for (size_t i = 0; i < w->frame_count; i++) w->frames[i].state = NULL;
     w->half = pl_lazy_change(tracer->scene->structure, w->half);
@@ -263,27 +307,27 @@ static pl_lazy_state *state_of(pl_tracer *tracer, size_t index, pl_error *error)
 
 /* Goes into an instance, that of a frame that is complete but for its state: by an item of the frame before, or the scene itself
  * (NULL). */
-static bool enter(pl_tracer *tracer, pl_lazy_item *it, pl_query *query)
+static bool enter(pl_tracer *tracer, pl_lazy_item *it, pl_error *error)
 {
     work *w = tracer->work;
     const uint32_t index = (uint32_t)w->frame_count;
     frame *f = &w->frames[index];
     f->symbol = it ? it->what : UINT32_MAX;
     if (index > PL_LIMIT_DEPTH)
-        return pl_fail_at(query->error, PL_ERROR_LIMIT, tracer->scene->program, f->symbol,
+        return pl_fail_at(error, PL_ERROR_LIMIT, tracer->scene->program, f->symbol,
                           "depth: a ray came %d symbols deep, which is the limit; does the recursion end?", PL_LIMIT_DEPTH);
     f->state = it ? atomic_load_explicit(&it->state, memory_order_acquire) : NULL;
     w->found += f->state != NULL;
     w->frame_count++;
     if (!f->state) {
         const uint32_t changes = w->changes;
-        pl_lazy_state *state = state_of(tracer, index, query->error);
+        pl_lazy_state *state = state_of(tracer, index, error);
         if (!state) return false;
         if (it && w->changes == changes) atomic_store_explicit(&it->state, state, memory_order_release);
     }
     if (w->spent > MOST_WORK)
-        return fail_work(tracer->scene, f->symbol, "needed to visit more nodes of the graph than", MOST_WORK, query->error);
-    return push_items(w, index, tracer->scene->gates != NULL, query, &tracer->counters);
+        return fail_work(tracer->scene, f->symbol, "needed to visit more nodes of the graph than", MOST_WORK, error);
+    return push_items(w, index, tracer->scene->gates != NULL, &tracer->counters, error);
 }
 
 static bool write_path(const void *context, pl_path *path)
@@ -302,80 +346,142 @@ static bool extend_path(work *w, const pl_lazy_item *item, pl_error *error)
     return true;
 }
 
-/* Decides at a gate that isn't clearly open, of an instance whose ray stands in f; where it is cut, offers its box. */
-static pl_gate decide(pl_tracer *tracer, const pl_lazy_item *it, frame *f, pl_query *query, bool *ok)
+/* Decides for a ray at a gate that isn't clearly open, of an instance that f is; where it is cut, offers its box. */
+static pl_gate decide(pl_tracer *tracer, const pl_lazy_item *it, frame *f, uint32_t ray, bool *ok)
 {
     work *w = tracer->work;
-    const pl_span within = span_of(w, w->frame_count - 1);
-    pl_arrival at = {0, f->at.o, f->at.d, f->at.stretch, within, (uint32_t)w->frame_count};
-    double t_entry;
-    const pl_gate gate = pl_gate_at(it->gate, f->at.o, f->at.d, f->at.stretch, &query->footprint, within, query->t_min,
-                                    query->t_max, &t_entry, &f->inside);
-    f->spanned = gate == PL_GATE_OPEN;
+    pl_query *query = &w->queries[ray];
+    double o[3], d[3], t_entry;
+    take_ray(w, f->slot, ray, o, d);
+    const pl_span within = span_of(w, w->frame_count - 1, ray);
+    pl_arrival at = {0, o, d, f->stretch, within, (uint32_t)w->frame_count};
+    const pl_gate gate = pl_gate_at(it->gate, o, d, f->stretch, &query->footprint, within, query->t_min, query->t_max, &t_entry,
+                                    inside_of(w, w->frame_count, ray));
+    if (gate == PL_GATE_OPEN) f->spanned |= UINT32_C(1) << ray;
     if (gate != PL_GATE_CUT || !(t_entry < query->t_max)) return gate;
     pl_leaf leaf = {.path = write_path, .source = w};
     const uint64_t hash = pl_cut_hash(0, w->path.terms, w->path.length);
-    const double coverage = pl_lazy_coverage(w->unfolder, it->what, it->scope, f->at.d);
+    const double coverage = pl_lazy_coverage(w->unfolder, it->what, it->scope, d);
     *ok = pl_query_cut_box(query, it->gate, coverage, &at, hash, t_entry, &leaf);
+    update(w, ray);
     return gate;
 }
 
-/* An item of the last frame, which the frame after it is made of. */
-static bool visit(pl_tracer *tracer, const pending *at, pl_query *query)
+/* Goes into the instance of an item, which f is, with the rays for which its gate is open. */
+static bool visit_instance(pl_tracer *tracer, pl_lazy_item *it, frame *f, const pending *at, pl_error *error)
 {
     work *w = tracer->work;
-    const pl_scene *scene = tracer->scene;
-    pl_lazy_state *state = state_of(tracer, at->frame, query->error);
-    if (!state || !grow(&w->frames, w->frame_count, &w->frame_capacity, sizeof *w->frames, query->error)) return false;
-    pl_lazy_item *it = &state->items[at->item];
     bool ok = true;
-    frame *f = &w->frames[w->frame_count];
-    f->item = at->item;
-    f->spanned = false;
-    f->at = at->arrived ? at->at : w->frames[at->frame].at;
-    if (!at->arrived) map_down(it, &f->at);
-    if (!extend_path(w, it, query->error)) return false;
-    f->terms = w->path.length;
-    if (it->kind == PL_NODE_ENTER) {
-        if (at->arrived && !at->open && decide(tracer, it, f, query, &ok) != PL_GATE_OPEN) return ok;
-        if (it->unbounded && ++w->unknown > MOST_UNKNOWN)
-            return fail_work(scene, it->what, "entered more instances of unknown size than", MOST_UNKNOWN, query->error);
-        return enter(tracer, it, query);
+    if (!at->arrived) w->kernel->map(it, rays_at(w, w->frames[at->frame].slot), rays_at(w, f->slot), f->rays);
+    for (uint32_t rays = at->arrived ? f->rays & ~at->open : 0; ok && rays;) {
+        const uint32_t ray = next_ray(&rays);
+        if (decide(tracer, it, f, ray, &ok) != PL_GATE_OPEN) f->rays &= ~(UINT32_C(1) << ray);
     }
-    pl_leaf leaf = {.arguments = it->arguments, .primitive = UINT64_MAX, .path = write_path, .source = w};
-    if (it->kind == PL_NODE_MESH) leaf.mesh = scene->meshes[it->what];
-    else leaf.shape = it->what;
-    tracer->counters.primitive_tests++;
-    leaf.o = f->at.o;
-    leaf.d = f->at.d;
-    return pl_query_leaf(query, &leaf);
+    if (!ok || !f->rays) {
+        give_slot(w, f->slot);
+        return ok;
+    }
+    if (it->unbounded && ++w->unknown > MOST_UNKNOWN)
+        return fail_work(tracer->scene, it->what, "entered more instances of unknown size than", MOST_UNKNOWN, error);
+    return enter(tracer, it, error);
 }
 
-static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
+/* Offers a primitive or a mesh to rays, in the frame of the state that it belongs to. */
+static bool visit_leaf(pl_tracer *tracer, const pl_lazy_item *it, uint32_t slot, uint32_t rays)
+{
+    work *w = tracer->work;
+    double o[3], d[3];
+    pl_leaf leaf = {.arguments = it->arguments, .primitive = UINT64_MAX, .path = write_path, .source = w, .o = o, .d = d};
+    if (it->kind == PL_NODE_MESH) leaf.mesh = tracer->scene->meshes[it->what];
+    else leaf.shape = it->what;
+    while (rays) {
+        const uint32_t ray = next_ray(&rays);
+        take_ray(w, slot, ray, o, d);
+        for (uint32_t i = 0; i < it->transform_count; i++) pl_map_ray(it->transforms[i], o, d);
+        tracer->counters.primitive_tests++;
+        if (!pl_query_leaf(&w->queries[ray], &leaf)) return false;
+        update(w, ray);
+    }
+    return true;
+}
+
+/* An item of the last frame, which the frame after it is made of. */
+static bool visit(pl_tracer *tracer, const pending *at, pl_error *error)
+{
+    work *w = tracer->work;
+    pl_lazy_state *state = state_of(tracer, at->frame, error);
+    if (!state || !grow(&w->frames, w->frame_count, &w->frame_capacity, sizeof *w->frames, error) ||
+        !grow(&w->inside, (w->frame_count + 1) * 4 * w->fours, &w->inside_capacity, sizeof *w->inside, error))
+        return false;
+    pl_lazy_item *it = &state->items[at->item];
+    if (!extend_path(w, it, error)) return false;
+    if (it->kind != PL_NODE_ENTER) {
+        give_slot(w, at->slot);
+        return visit_leaf(tracer, it, w->frames[at->frame].slot, at->rays);
+    }
+    frame *f = &w->frames[w->frame_count];
+    *f = (frame){.terms = w->path.length, .item = at->item, .slot = at->slot, .rays = at->rays, .stretch = at->stretch};
+    return visit_instance(tracer, it, f, at, error);
+}
+
+/* The rays as they are in the world. */
+static bool begin(work *w, const pl_scene *scene, const pl_ray *rays, pl_query *queries, unsigned count, pl_error *error)
 {
     static const pl_footprint none;
+    uint32_t slot;
+    w->queries = queries;
+    w->fours = (count + 3) / 4;
+    w->all = UINT32_MAX >> (32 - count);
+    w->stack_count = w->frame_count = w->slot_count = w->free_count = w->path.length = w->unknown = 0;
+    w->spent = w->found = 0;
+    if (!grow(&w->frames, 0, &w->frame_capacity, sizeof *w->frames, error) ||
+        !grow(&w->inside, 4 * w->fours, &w->inside_capacity, sizeof *w->inside, error) || !take_slot(w, &slot, error))
+        return false;
+    w->frames[0] = (frame){.slot = slot, .rays = w->all, .spanned = w->all, .stretch = 1.0};
+    pl_lazy_four *fours = rays_at(w, slot);
+    for (uint32_t i = 0; i < 4 * w->fours; i++) {
+        const uint32_t ray = i < count ? i : 0; /* what fills the last four counts nowhere */
+        const pl_footprint footprint = scene->gates ? queries[ray].footprint : none;
+        for (int axis = 0; axis < 3; axis++) {
+            fours[i / 4].o[axis][i % 4] = rays[ray].origin[axis];
+            fours[i / 4].d[axis][i % 4] = rays[ray].direction[axis];
+        }
+        fours[i / 4].leave[i % 4] = w->wants.t_max[i] = queries[ray].t_max;
+        w->wants.t_min[i] = queries[ray].t_min;
+        w->wants.width[i] = footprint.width;
+        w->wants.spread[i] = footprint.spread;
+        *inside_of(w, 0, i) = (pl_span){queries[ray].t_min, INFINITY};
+    }
+    return true;
+}
+
+static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
+{
     work *w = tracer->work;
     pl_lazy_cache *cache = tracer->scene->structure;
-    if (!grow(&w->frames, 0, &w->frame_capacity, sizeof *w->frames, query->error)) return false;
-    frame *root = &w->frames[0];
-    *root = (frame){.at = {.stretch = 1.0, .leave = query->t_max}, .spanned = true, .inside = {query->t_min, INFINITY}};
-    memcpy(root->at.o, ray->origin, sizeof root->at.o);
-    memcpy(root->at.d, ray->direction, sizeof root->at.d);
-    w->stack_count = w->frame_count = w->path.length = w->unknown = 0;
-    w->spent = w->found = 0;
-    w->footprint = tracer->scene->gates ? query->footprint : none;
+    pl_error *error = queries->error;
+    if (!begin(w, tracer->scene, rays, queries, count, error)) return false;
     w->half = pl_lazy_hold(cache);
-    bool ok = enter(tracer, NULL, query);
-    for (uint64_t steps = 0; ok && w->stack_count && !query->done; steps++) {
-        const pending *at = &w->stack[--w->stack_count]; /* until something is pushed */
-        if (steps > PL_LIMIT_RAY_STEPS) ok = pl_query_fail_steps(query, PL_LIMIT_RAY_STEPS);
-        else if (at->t_entry > query->t_max) continue;
-        w->frame_count = at->frame + 1;
-        ok = ok && visit(tracer, at, query);
+    bool ok = enter(tracer, NULL, error);
+    for (uint64_t steps = 0; ok && w->stack_count && w->all; steps++) {
+        pending at = w->stack[--w->stack_count];
+        if (steps > PL_LIMIT_RAY_STEPS) ok = pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
+        at.rays = w->kernel->waiting(&w->wants, rays_at(w, at.slot), at.rays);
+        if (!at.rays) {
+            give_slot(w, at.slot);
+            continue;
+        }
+        while (w->frame_count > at.frame + 1) give_slot(w, w->frames[--w->frame_count].slot);
+        ok = ok && visit(tracer, &at, error);
     }
     pl_lazy_release(cache, w->half);
     pl_lazy_add_found(cache, w->found);
     return ok;
+}
+
+static bool trace(pl_tracer *tracer, const pl_ray *ray, pl_query *query)
+{
+    return trace_many(tracer, ray, query, 1);
 }
 
 static bool number(pl_tracer *tracer, pl_hit *hit, pl_error *error)
@@ -401,4 +507,5 @@ const pl_accel pl_accel_lazy = {.name = "bvh",
                                 .work_create = work_create,
                                 .work_destroy = work_destroy,
                                 .trace = trace,
+                                .trace_many = trace_many,
                                 .number = number};

@@ -108,4 +108,36 @@ bool pl_unfolder_derive(pl_unfolder *unfolder, uint32_t symbol, pl_classes *clas
 /* Writes it to memory of so many bytes. */
 pl_lazy_state *pl_unfolder_write(pl_unfolder *unfolder, uint32_t symbol, uint64_t hash, void *memory);
 
+/* --- lazy_kernel.h, for each instruction set --- */
+
+/* Four rays in the frame of an instance. */
+typedef struct pl_lazy_four {
+    double o[3][4], d[3][4];
+    double enter[4]; /* where they enter what is to be visited next */
+    double leave[4]; /* with cut-offs: from there on nothing stands below */
+} pl_lazy_four;
+
+/* What rays want: the queries' t and footprints; without a cut-off the latter are 0, so that all gates are clearly open. */
+typedef struct pl_lazy_wants {
+    double t_min[PL_TRACE_MANY], t_max[PL_TRACE_MANY], width[PL_TRACE_MANY], spread[PL_TRACE_MANY];
+} pl_lazy_wants;
+
+/* Of rays, a bit each, in fours. What is told of those that are left: `enter` of each, and *first, the least of these. */
+typedef struct pl_lazy_kernel {
+    /* Those that meet an item's box. */
+    uint32_t (*clip)(const pl_lazy_item *it, const pl_reach *reach, double stretch, const pl_lazy_wants *wants,
+                     const pl_lazy_four *from, pl_lazy_four *to, uint32_t rays, double *first);
+    /* Maps them into an item's frame. */
+    void (*map)(const pl_lazy_item *it, const pl_lazy_four *from, pl_lazy_four *to, uint32_t rays);
+    /* Those that meet a gate, in whose frame they are; *open: those for which it is clearly open. from: above it. */
+    uint32_t (*meet)(const pl_gate_box *gate, double stretch, const pl_lazy_wants *wants, const pl_lazy_four *from,
+                     pl_lazy_four *to, uint32_t rays, uint32_t *open, double *first);
+    /* Sets `enter` where nothing is known; the least. */
+    double (*begin)(const pl_lazy_wants *wants, pl_lazy_four *to, uint32_t rays);
+    /* Those that enter before what they want ends. */
+    uint32_t (*waiting)(const pl_lazy_wants *wants, const pl_lazy_four *at, uint32_t rays);
+} pl_lazy_kernel;
+
+extern const pl_lazy_kernel pl_lazy_kernel_scalar, pl_lazy_kernel_avx2, pl_lazy_kernel_avx512;
+
 #endif

@@ -62,6 +62,7 @@ def angle(chosen: random.Random) -> float:
             lambda: chosen.uniform(-1e6, 1e6),
             lambda: near(chosen.randint(-40, 40) * 45.0, chosen),
             lambda: near(chosen.randint(-100, 100) * 15.0, chosen),
+            lambda: near(chosen.randint(-90, 90) / 2.0, chosen),
             lambda: anywhere(chosen),
         )
     )()

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 
+from instruction_sets import available
 from plsys.compiler.pipeline import build
 from plsys.compiler.reading.source import Source
 from plsys.runtime import Scene
@@ -121,6 +122,23 @@ def test_a_cut_off_is_the_same_while_states_are_thrown_out():
     assert counts["lazy"]["evicted"] > 0
     for name, values in expected.items():
         np.testing.assert_array_equal(found[name], values, err_msg=name)
+
+
+@pytest.mark.parametrize(("level", "order", "px", "memory"), [(2, 5, 0.0, 60_000), (4, 7, 0.7, 24_000_000), (4, 10, 0.2, 20_000_000)])
+def test_rays_that_go_together_see_what_each_sees_alone(level, order, px, memory):
+    """Colours are traced in packets, shadows too, the other channels ray by ray."""
+    data = forest(level, order)
+    with Scene(data, accelerator="none", detail=px, threads=2) as scene:
+        expected = scene.render(42, 31)["color"]
+    for isa in available(data):
+        with Scene(data, memory=memory, detail=px, isa=isa, threads=1) as scene:
+            together = scene.render(42, 31)["color"]
+            found = scene.statistics["lazy"]["found"]
+            alone = scene.render(42, 31, channels=("color", "boxes"))["color"]
+            assert found < 0.5 * (scene.statistics["lazy"]["found"] - found)
+            assert memory == 24_000_000 or scene.statistics["lazy"]["evicted"] > 0
+        np.testing.assert_array_equal(together, expected, err_msg=isa)
+        np.testing.assert_array_equal(alone, expected, err_msg=isa)
 
 
 def test_a_cut_off_keeps_what_a_forest_covers_and_unfolds_less():

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from instruction_sets import available
 from plsys.compiler import compile
 from plsys.runtime import PlsysRuntimeError, Scene
 from random_scenes import scenes
@@ -19,7 +20,6 @@ from random_scenes import scenes
 ROOT = Path(__file__).resolve().parents[3]
 ALL = 2**64 - 1
 ITEMS = (1, 21, 256, 2048, ALL)
-SETS = ("scalar", "avx2", "avx512")
 SCENES = {
     "tree": {"order": 6},
     "menger": {"level": 2},
@@ -28,19 +28,6 @@ SCENES = {
     "mirrors": {},
     "koch": {},
 }
-
-
-def available(data: bytes) -> list[str]:
-    """The instruction sets of this machine."""
-    found = []
-    for isa in SETS:
-        try:
-            Scene(data, isa=isa).close()
-        except PlsysRuntimeError:
-            continue
-        found.append(isa)
-    assert "scalar" in found
-    return found
 
 
 def rays(data: bytes, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_fronts import answers, assert_same, available
+from test_fronts import answers, assert_same
 from test_together import bundles
 from wooded_hills import WOODED
+from instruction_sets import available
 from plsys.compiler import compile
 from plsys.runtime import Scene
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from test_fronts import ALL, ROOT, SCENES, answers, assert_same, available
+from test_fronts import ALL, ROOT, SCENES, answers, assert_same
 
+from instruction_sets import available
 from plsys.compiler import compile
 from plsys.runtime import PlsysRuntimeError, Scene
 from random_scenes import scenes
