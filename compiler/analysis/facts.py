@@ -10,7 +10,7 @@ Example: the facts of ``Selection A { A -> C_step A; }`` are one definition (``A
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Iterator, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..reading import mistakes, syntax, vocabulary
 from ..reading.diagnostics import Diagnostic, Diagnostics
@@ -90,10 +90,9 @@ class Facts:
         return self._tree
 
     def retouched(self, *others: str) -> None:
-        """The text has changed, and with it all else but the tree and what follows from names; ``others`` are properties that
-        did not follow."""
+        """The text has changed, and with it places in the syntax; ``others`` are properties that did not follow."""
         self.text, self._tree = self.file.span.source.data, None
-        for each in ("is_broken", *others):
+        for each in others:
             self.__dict__.pop(each, None)
 
     @lazy_property
@@ -119,19 +118,33 @@ class Facts:
     @lazy_property
     def names(self) -> list[Name]:
         """All occurrences of names that may be the scene's own, in text order."""
-        found = [name for node in self.file.definitions for name in _names_of(node)]
-        return sorted(
-            {(name.start, name.end): name for name in found if name.node.name}.values(), key=lambda n: n.start
-        )
+        found: list[Name] = []
+        for node in self.file.definitions:
+            _names_of(node, found)
+        places = {(span.start, span.end): name for name in found if name.node.name for span in (name.node.span,)}
+        return [places[place] for place in sorted(places)]
 
     @lazy_property
-    def words(self) -> frozenset[str]:
-        """The names that occur."""
-        return frozenset([name.node.name for name in self.names])
+    def words(self) -> dict[str, int]:
+        """The names that occur, and how often."""
+        found: dict[str, int] = {}
+        for each in self.names:
+            name = each.node.name
+            found[name] = found.get(name, 0) + 1
+        return found
+
+    def renamed(self, old: str, new: str) -> None:
+        """One of ``names`` was ``old`` and is ``new``."""
+        words = self.words
+        words[new] = words.get(new, 0) + 1
+        if words[old] > 1:
+            words[old] -= 1
+        else:
+            del words[old]
 
     @lazy_property
     def is_broken(self) -> bool:
-        return any(item.severity == "error" for item in self.syntax)
+        return any([item.severity == "error" for item in self.syntax])
 
 
 def facts_of(block: Block) -> Facts:
@@ -203,39 +216,34 @@ def _point(block: Block, offset: int) -> tuple[int, int]:
 # --- names
 
 
-def _occurrence(name: syntax.Name, role: str = "read") -> Name:
-    return Name(role, name)
-
-
-def _names_of(node: syntax.Definition) -> Iterator[Name]:
+def _names_of(node: syntax.Definition, found: list[Name]) -> None:
     match node:
         case syntax.Block():
-            yield from _block(node)
+            _block(node, found)
         case syntax.Declare():
-            yield _occurrence(node.name, "definition")
-            yield from _items(node.items, frozenset())
+            found.append(Name("definition", node.name))
+            _items(node.items, frozenset(), found)
         case syntax.ParameterDeclaration():
-            yield _occurrence(node.name, "definition")
+            found.append(Name("definition", node.name))
             for each in (node.value, node.low, node.high):
-                yield from _expression(each)
+                _expression(each, found)
         case syntax.Selection():
-            yield _occurrence(node.name, "definition")
-            for name in node.parameters:
-                yield _occurrence(name, "write")
+            found.append(Name("definition", node.name))
+            found += [Name("write", name) for name in node.parameters]
             if node.entry is not None:
-                yield from _term(node.entry)
+                _term(node.entry, found)
             for production in node.productions:
-                yield from _production(production)
+                _production(production, found)
         case syntax.Calculation() | syntax.Transformation():
-            yield _occurrence(node.name, "definition")
-            yield from _statements(node.statements)
+            found.append(Name("definition", node.name))
+            _statements(node.statements, found)
         case syntax.Texture():
-            yield _occurrence(node.name, "definition")
-            yield from _block(node.block)
+            found.append(Name("definition", node.name))
+            _block(node.block, found)
 
 
-def _block(node: syntax.Block) -> Iterator[Name]:
-    yield from _items(node.items, _words_of(node.name.name))
+def _block(node: syntax.Block, found: list[Name]) -> None:
+    _items(node.items, _words_of(node.name.name), found)
 
 
 def _words_of(block: str) -> frozenset[str]:
@@ -252,14 +260,14 @@ _WORDS: dict[str, frozenset[str]] = {}
 _FLAGS = frozenset(row.name for row in vocabulary.ALL.values() if row.type == "flag")
 
 
-def _items(items: tuple, words: frozenset[str]) -> Iterator[Name]:
+def _items(items: tuple, words: frozenset[str], found: list[Name]) -> None:
     """``words`` are properties where one may stand; where a value must, the same name is the scene's."""
     needs_value = False
     for item in items:
         if isinstance(item, syntax.Block):
-            yield from _block(item)
+            _block(item, found)
         elif isinstance(item, syntax.MapEntry):
-            yield from _items(item.items, _words_of(""))
+            _items(item.items, _words_of(""), found)
         elif (
             isinstance(item, syntax.Name)
             and item.name in words
@@ -268,73 +276,73 @@ def _items(items: tuple, words: frozenset[str]) -> Iterator[Name]:
             needs_value = item.name not in _FLAGS
             continue
         else:
-            yield from _expression(item)
+            _expression(item, found)
         needs_value = False
 
 
-def _expression(node: syntax.Expression | None) -> Iterator[Name]:
+def _expression(node: syntax.Expression | None, found: list[Name]) -> None:
     match node:
         case syntax.Name():
-            yield _occurrence(node)
+            found.append(Name("read", node))
         case syntax.Call():
-            yield _occurrence(node.name)
+            found.append(Name("read", node.name))
             for each in node.arguments:
-                yield from _expression(each)
+                _expression(each, found)
         case syntax.Vector():
             for each in node.components:
-                yield from _expression(each)
+                _expression(each, found)
         case syntax.Unary():
-            yield from _expression(node.operand)
+            _expression(node.operand, found)
         case syntax.Binary():
-            yield from _expression(node.left)
-            yield from _expression(node.right)
+            _expression(node.left, found)
+            _expression(node.right, found)
         case syntax.Conditional():
             for each in (node.test, node.then, node.otherwise):
-                yield from _expression(each)
+                _expression(each, found)
 
 
-def _statements(statements: tuple[syntax.Statement, ...]) -> Iterator[Name]:
+def _statements(statements: tuple[syntax.Statement, ...], found: list[Name]) -> None:
     for statement in statements:
         if isinstance(statement, syntax.Assignment):
-            yield _occurrence(statement.target, "write")
-            yield from _expression(statement.value)
+            found.append(Name("write", statement.target))
+            _expression(statement.value, found)
         else:
-            yield _occurrence(statement.name)
+            found.append(Name("read", statement.name))
             for each in statement.arguments:
-                yield from _expression(each)
+                _expression(each, found)
 
 
-def _production(node: syntax.Production | None) -> Iterator[Name]:
+def _production(node: syntax.Production | None, found: list[Name]) -> None:
     while isinstance(node, syntax.If):
-        yield from _expression(node.test)
-        yield from _production(node.then)
+        _expression(node.test, found)
+        _production(node.then, found)
         node = node.otherwise
     if node is None:
         return
     if isinstance(node.target, syntax.Call):
-        yield _occurrence(node.target.name, "target")
+        found.append(Name("target", node.target.name))
         for each in node.target.arguments:
-            yield from _expression(each)
+            _expression(each, found)
     else:
-        yield _occurrence(node.target, "target")
+        found.append(Name("target", node.target))
     for alternative in node.alternatives:
-        yield from _expression(alternative.weight)
+        _expression(alternative.weight, found)
         if alternative.body is not None:
-            yield from _union(alternative.body)
+            _union(alternative.body, found)
 
 
-def _union(node: syntax.Union) -> Iterator[Name]:
+def _union(node: syntax.Union, found: list[Name]) -> None:
     for term in node.terms:
-        yield from _term(term)
+        _term(term, found)
 
 
-def _term(node: syntax.Term) -> Iterator[Name]:
+def _term(node: syntax.Term, found: list[Name]) -> None:
     for item in node.items:
         if isinstance(item, syntax.Group):
-            yield from _union(item.union)
+            _union(item.union, found)
         elif isinstance(item, syntax.Inline):
-            yield from _statements(item.statements)
+            _statements(item.statements, found)
         elif isinstance(item, syntax.Block):
-            yield from _block(item)
+            _block(item, found)
         else:
-            yield from _expression(item)
+            _expression(item, found)

@@ -90,9 +90,8 @@ class Namespace:
             self._unfinished.setdefault(definition.name, {})[facts] = None
         self._touched[definition.name] = None
 
-    def rename(self, facts: Facts, old: str, new: str, before: frozenset[str]) -> None:
-        """``facts``, with other words than ``before``, name what they define or assign ``new`` in one place where they named it
-        ``old``."""
+    def rename(self, facts: Facts, old: str, new: str) -> None:
+        """``facts`` name what they define or assign ``new`` in one place where they named it ``old``."""
         for name in (old, new):
             for table in (self.definers, self._unfinished, self.writers):
                 self._drop(table, name, facts)
@@ -103,7 +102,7 @@ class Namespace:
         for each in facts.assigned:
             if each.name in (old, new):
                 self.writers.setdefault(each.name, {}).setdefault(facts, []).append(each)
-        self.learn_uses(facts, before)
+        self.rename_use(facts, old, new)
 
     def _learn_users(self, facts: Facts, words: Iterable[str]) -> None:
         users = self.users
@@ -113,13 +112,21 @@ class Namespace:
             else:
                 users[name] = {facts: None}
 
-    def learn_uses(self, facts: Facts, before: frozenset[str]) -> None:
-        """``facts`` have other words than ``before``, but still define and assign the same names."""
+    def rename_use(self, facts: Facts, old: str, new: str) -> None:
+        """``facts`` have the name ``new`` in one place where they had ``old``."""
         words = facts.words
-        if words != before:
-            for name in before - words:
-                self._drop(self.users, name, facts)
-            self._learn_users(facts, words - before)
+        if old not in words:
+            self._drop(self.users, old, facts)
+        if words[new] == 1:
+            self._learn_users(facts, (new,))
+        self.learn_value(facts)
+
+    def learn_uses(self, facts: Facts, before: dict[str, int]) -> None:
+        """``facts`` have other words than ``before``, but still define and assign the same names."""
+        words = facts.words.keys()
+        for name in before.keys() - words:
+            self._drop(self.users, name, facts)
+        self._learn_users(facts, words - before.keys())
         self.learn_value(facts)
 
     def learn_value(self, facts: Facts, is_other: bool = False) -> None:

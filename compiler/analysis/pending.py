@@ -28,7 +28,8 @@ class Pending:
         return bool(self._changes)
 
     def add(self, change: Change) -> None:
-        touched = list(dict.fromkeys(self._of[block] for block in change.removed if block in self._of))
+        of = self._of
+        touched = list(dict.fromkeys([of[block] for block in change.removed if block in of]))
         # A file that is being opened is one large change: the others go into it.
         joined = max(touched, key=lambda each: len(each.added), default=None) or _Joined()
         self._changes[joined] = None
@@ -46,10 +47,9 @@ class Pending:
         joined.added.update(dict.fromkeys(change.added))
         self._of.update(dict.fromkeys(change.added, joined))
 
-    def take(self) -> Change:
-        """The oldest change, which is pending no longer."""
-        joined = next(iter(self._changes))
-        del self._changes[joined]
-        for block in joined.added:
-            del self._of[block]
-        return Change(list(joined.removed), list(joined.added))
+    def take(self) -> list[Change]:
+        """All changes, the oldest first, which are pending no longer."""
+        changes = [Change(list(joined.removed), list(joined.added)) for joined in self._changes]
+        self._changes.clear()
+        self._of.clear()
+        return changes

@@ -13,10 +13,12 @@ its syntax, and moves ``scale 2`` on by one.
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections import deque
 from dataclasses import replace
 from functools import cache
 from itertools import repeat
+from operator import attrgetter
 from typing import NamedTuple
 
 from ..reading import syntax, vocabulary
@@ -41,6 +43,8 @@ _REST = re.compile(rb'(?:[^/"\r\n]*(?:"[^"\\\r\n]*"[^/"\r\n]*)*[;{}])?[ \t]*(?:/
 
 # Definitions with operations in them: where one goes on in a later line, the reader looks at columns.
 _WITH_COLUMNS = (syntax.Selection, syntax.Calculation, syntax.Transformation)
+
+_END = attrgetter("node.span.end")
 
 _set_source, _set_start, _set_end = Span.source.__set__, Span.start.__set__, Span.end.__set__
 _set_name = syntax.Name.name.__set__
@@ -120,11 +124,9 @@ def touch_of(old: Block, new: Block) -> Touch | None:
 
 def _name_at(facts: Facts, low: int, high: int) -> int | None:
     """The number of the name that the bytes from ``low`` to ``high`` are within or at an end of."""
-    for index, name in enumerate(facts.names):
-        span = name.node.span
-        if high <= span.end:
-            return index if span.start <= low else None
-    return None
+    names = facts.names
+    index = bisect_left(names, high, key=_END)
+    return index if index < len(names) and names[index].node.span.start <= low else None
 
 
 def _leaf_at(facts: Facts, low: int, high: int) -> syntax.Name | syntax.Number | None:
@@ -158,9 +160,10 @@ def _in_name(facts: Facts, new: Block, leaf: syntax.Name, index: int | None, by:
     if leaf.name in reserved or text in reserved:
         return None
     renames = index is not None and facts.names[index].role in _RENAMING
-    renames = renames or any([each is leaf for each in _heads(facts)])
-    if index is not None and not _is_plain(new) and (leaf.name in _words() or text in _words()):
-        index = None
+    if not _is_plain(new):
+        renames = renames or any([each is leaf for each in _heads(facts)])
+        if index is not None and (leaf.name in _words() or text in _words()):
+            index = None
     return Touch(leaf, text, end, by, index, renames=renames)
 
 
@@ -216,20 +219,24 @@ def retouch(old: Block, new: Block, touch: Touch) -> None:
     """Give ``new`` the facts of ``old``, which are then ``old``'s no more."""
     facts = old.__dict__.pop("facts")
     move(facts, new, touch.end, touch.by)
-    if isinstance(touch.leaf, syntax.Name):
-        _set_name(touch.leaf, touch.text)
+    leaf = touch.leaf
+    if isinstance(leaf, syntax.Name):
+        if touch.index is not None:
+            facts.renamed(leaf.name, touch.text)
+        _set_name(leaf, touch.text)
     elif touch.number is not None:
-        _set_value(touch.leaf, touch.number.value)
-        _set_text(touch.leaf, touch.text)
-        facts.syntax[:] = [replace(each, span=touch.leaf.span) for each in touch.said]
-    is_name = isinstance(touch.leaf, syntax.Name)
-    if is_name and touch.index is None:
+        _set_value(leaf, touch.number.value)
+        _set_text(leaf, touch.text)
+        facts.syntax[:] = [replace(each, span=leaf.span) for each in touch.said]
+    if touch.index is not None:
+        facts.retouched()
+        if touch.renames and facts.names[touch.index].role == "definition":
+            facts.definitions[:] = [Definition(each.node.name.name, each.kind, each.node) for each in facts.definitions]
+    elif isinstance(leaf, syntax.Name):
         # Which words of a scene block are the scene's depends on the others.
         facts.retouched("words", "names", "definitions", "assigned")
     else:
-        if touch.index is not None and facts.names[touch.index].role == "definition":
-            facts.definitions[:] = [Definition(each.node.name.name, each.kind, each.node) for each in facts.definitions]
-        facts.retouched(*(("words",) if is_name else ()))
+        facts.retouched("is_broken")
     new.__dict__.update(facts=facts, before=None)
 
 
@@ -237,7 +244,7 @@ def _names_its_rules(facts: Facts, start: int) -> bool:
     """Whether what the first line of a Selection is depends on the name at ``start``: its own name, or one in an entry
     action."""
     for each in facts.definitions:
-        if isinstance(each.node, syntax.Selection) and each.node.entry is not None and start < each.node.entry.span.end:
+        if each.kind == "selection" and each.node.entry is not None and start < each.node.entry.span.end:
             return True
     return False
 

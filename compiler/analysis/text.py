@@ -217,16 +217,14 @@ class Text:
         end = _CODE_END.search(old).start() if has_comments else len(old.rstrip()) - 1  # type: ignore[union-attr]
         if high > end or old[end] not in b"};":
             return None
-        if not shape.hard and not 0 <= old.find(b"{") < low:
-            return None  # it might be no block any more
         new = old[:low] + data + old[high:]
-        if (_NAMELESS.match(new) is None) is not (_NAMELESS.match(old) is None):
-            return None  # a name in the line before makes `name Selection {` of it, which starts there
+        if not 0 <= old.find(b"{") < low:  # in the head
+            if not shape.hard or not is_hard(new):
+                return None  # it might be no block any more, or another kind of one
+            if (_NAMELESS.match(new) is None) is not (_NAMELESS.match(old) is None):
+                return None  # a name in the line before makes `name Selection {` of it, which starts there
         # Plain bytes are no tokens of the split but in the words that begin a line.
-        if not block.has_head_lines:
-            if is_hard(new) != shape.hard:
-                return None
-        elif [piece.shape for piece in split(new)] != [shape]:
+        if block.has_head_lines and [piece.shape for piece in split(new)] != [shape]:
             return None
         if new == old:
             return Change([], [])

@@ -50,40 +50,42 @@ def nearest_of(name: str, indexes: Sequence[NameIndex]) -> str:
     """As ``nearest``, of all names in ``indexes``, which have none in common."""
     if sum(len(index.heads) for index in indexes) < MANY_NAMES:
         return _hint(name, [other for index in indexes for other in index.heads])
-    found = set(_neighbours(name, [index.heads for index in indexes]))
-    if (slip := _a_letter_off(name, found)) is not None:
+    shorter = _shorter(name)
+    found = _neighbours(name, [index.heads for index in indexes])
+    if (slip := _a_letter_off(name, found, shorter)) is not None:
         return f"did you mean '{slip}'?"
-    found.update(other[::-1] for other in _neighbours(name[::-1], [index.tails for index in indexes]))
-    if (slip := _a_letter_off(name, found)) is not None:
+    found += [other[::-1] for other in _neighbours(name[::-1], [index.tails for index in indexes])]
+    if (slip := _a_letter_off(name, found, shorter)) is not None:
         return f"did you mean '{slip}'?"
-    if (slip := _without_a_letter(name, indexes)) and all(other.casefold() != name.casefold() for other in found):
-        return f"did you mean '{slip}'?"
+    # A letter too many among names that differ by little, such as numbered ones: there the one that was meant is a neighbour
+    # in neither order.
+    meant = [other for other in shorter for index in indexes if other in index.names]
+    if meant and all(other.casefold() != name.casefold() for other in found):
+        return f"did you mean '{max(meant)}'?"
     size = len(name)
-    alike = [other for other in found if 2 * min(size, len(other)) >= CLOSE * (size + len(other))]  # can be, by their lengths
+    alike = {other for other in found if 2 * min(size, len(other)) >= CLOSE * (size + len(other))}  # can be, by their lengths
     return _hint(name, sorted(alike, key=lambda other: (-_alike(name, other), other))[:LIKELIEST])
 
 
-def _a_letter_off(name: str, names: Iterable[str]) -> str | None:
+def _shorter(name: str) -> set[str]:
+    """What ``name`` may be without one of its letters; of fewer than three letters nothing, since what is left of them says
+    little."""
+    return {name[:i] + name[i + 1 :] for i in range(len(name))} if len(name) > 2 else set()
+
+
+def _a_letter_off(name: str, names: Iterable[str], shorter: set[str]) -> str | None:
     """The one of ``names`` that has a letter more than ``name``, or else one that lacks a letter: by difflib's ratio no
     other is more like a ``name`` of three letters or more, so that the others needn't be compared."""
-    size, folded, slips = len(name), name.casefold(), []
+    size, slips = len(name), []
     for other in names:
-        more = len(other) - size
-        if not more:
-            if other.casefold() == folded:
+        if other in shorter:
+            slips.append(other)
+        elif len(other) == size:
+            if other.casefold() == name.casefold():
                 return None
-        elif (more == 1 and _has_one_more(name, other)) or (more == -1 and _has_one_more(other, name)):
+        elif len(other) == size + 1 and _has_one_more(name, other):
             slips.append(other)
     return max(slips, key=lambda other: (len(other), other), default=None) if size > 2 else None
-
-
-def _without_a_letter(name: str, indexes: Sequence[NameIndex]) -> str | None:
-    """As ``_a_letter_off``, for a letter too many among names that differ by little, such as numbered ones: there the name
-    that was meant is a neighbour in neither order."""
-    if len(name) < 3:
-        return None
-    meant = (name[:i] + name[i + 1 :] for i in range(len(name)))
-    return max((other for other in meant if any(other in index.names for index in indexes)), default=None)
 
 
 def _has_one_more(one: str, other: str) -> bool:
@@ -104,7 +106,7 @@ def _hint(name: str, names: list[str]) -> str:
     same = next((other for other in names if other.casefold() == folded), None)
     if same is not None:
         return f"did you mean '{same}'?"
-    best = _a_letter_off(name, names) or _most_like(name, names)
+    best = _a_letter_off(name, names, _shorter(name)) or _most_like(name, names)
     return f"did you mean '{best}'?" if best else ""
 
 
@@ -116,8 +118,11 @@ def _most_like(name: str, names: list[str]) -> str:
     matcher.set_seq2(name)
     best, ratio = "", CLOSE
     for other in names:
+        most = min(sum(map(other.__contains__, name)), sum(map(name.__contains__, other)))  # letters that can be in common
+        if 2 * most < ratio * (len(name) + len(other)):
+            continue
         matcher.set_seq1(other)
-        if matcher.real_quick_ratio() >= ratio and matcher.quick_ratio() >= ratio:
+        if matcher.quick_ratio() >= ratio:
             found = matcher.ratio()
             if (found, other) >= (ratio, best):
                 best, ratio = other, found

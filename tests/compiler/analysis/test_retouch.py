@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
-from plsys.compiler.analysis import Document, Project, facts_of
+from plsys.compiler.analysis import Deadline, Document, Project, facts_of
 from plsys.compiler.analysis.text import Block
 from plsys.compiler.reading.source import Span
 from stress import rounds
@@ -66,6 +66,8 @@ def known(block: Block) -> list[object]:
         [(each.name, each.kind, shown(each.node, block)) for each in facts.definitions],
         shown(facts.assigned, block),
         [(each.code, each.message, shown(each.span, block)) for each in facts.syntax],
+        facts.words,
+        facts.is_broken,
         facts.text,
         str(facts.tree.root_node),
     ]
@@ -76,6 +78,12 @@ def told(project: Project, document: Document) -> list[tuple]:
     return sorted((m.start, m.end, m.diagnostic.code, m.diagnostic.message) for m in project.messages(document))
 
 
+def used(project: Project, document: Document) -> dict[str, list[tuple]]:
+    """Where each name stands."""
+    scene = project.scene_of(document)
+    return {name: [(each.start, each.end, each.role) for each in scene.uses(name)] for name in scene.users}
+
+
 def check(project: Project, document: Document) -> None:
     """All that is known equals what a fresh start finds out."""
     for block in document.text.blocks:
@@ -84,6 +92,7 @@ def check(project: Project, document: Document) -> None:
         fresh = Project()
         other = fresh.open(document.path, document.text.data, name="y")
         assert told(project, document) == told(fresh, other), document.text.data.decode()
+        assert used(project, document) == used(fresh, other)
 
 
 def places(rng: random.Random, document: Document, count: int) -> list[int]:
@@ -117,6 +126,23 @@ def test_letters_at_many_places(seed):
         check(project, document)
     if seed == 1:
         assert kept > 0
+
+
+@pytest.mark.parametrize("seed", range(rounds(15, 500)))
+def test_letters_typed_while_others_are_being_read(seed):
+    rng = random.Random(seed)
+    project = Project()
+    document = project.open(None, SCENE.encode(), name="x")
+    project.work()
+    for _ in range(10):
+        for _ in range(rng.choice((2, 3))):
+            letters = rng.choice(LETTERS)
+            cut = 0 if letters and rng.random() < 0.7 else 1
+            project.edits(document, [(at, at + cut, letters.encode()) for at in places(rng, document, 6)])
+            for _ in range(rng.choice((0, 1, 2, 3))):
+                project.work(Deadline(0.0))  # some blocks only
+        project.work()
+        check(project, document)
 
 
 @pytest.mark.parametrize(
