@@ -108,10 +108,24 @@ static float wide_of(const pl_front_items *items)
     return (float)fmin(WIDEST, WIDE_ITEMS * sum / (double)(items->box_count + 1));
 }
 
+/* Whether a ray that comes to a front meets one of its primitives as a rule: their boxes have more surface than its own. */
+static bool is_dense(const pl_front *front, const pl_front_items *items)
+{
+    const float *half = front->half;
+    float sum = 0.0f;
+    for (size_t i = 0; i < items->box_count; i++) {
+        const pl_boxed *box = &items->boxes[i];
+        const float x = box->hi[0] - box->lo[0], y = box->hi[1] - box->lo[1], z = box->hi[2] - box->lo[2];
+        if (box->ref >> PL_REF_SHIFT != PL_KIND_INSTANCE) sum += x * y + y * z + z * x;
+    }
+    return sum > 4.0f * (half[0] * half[1] + half[1] * half[2] + half[2] * half[0]);
+}
+
 /* Builds a front's tree and gives it its items; what they were listed with is freed. */
 static bool keep(pl_front *front, pl_front_items *items, int threads, bool improve)
 {
     front->wide = wide_of(items);
+    front->dense = is_dense(front, items);
     front->nodes = pl_front_tree(items->boxes, items->box_count, &front->node_count, &front->root, threads, improve);
     front->primitives = items->primitives;
     front->instances = items->instances;

@@ -122,6 +122,7 @@ typedef struct pl_front {
     float half[4];           /* of the box in the unit frame */
     pl_front_bounds bounds;
     float wide;              /* rays farther apart in the unit frame are soon among different items */
+    bool dense;              /* rays that come to it have a candidate as a rule */
     float slack_gain, slack_base; /* no normative hit lies farther outside its box, there, than gain * distance + base */
     pl_box box;              /* of the bounded items, in the state's frame */
     pl_reach reach;

@@ -17,7 +17,7 @@ enum {
     MOST_NODES = 64 /* as many are worth their time; then the rays are traced */
 };
 
-/* Eyes farther from the front than this, in its unit frame, are left to the rays: as FAR of kernel.h. */
+/* Eyes farther from the front than this, in its unit frame, are left to the rays: as far_of in kernel.h. */
 #define FARTHEST 64.0
 
 /* A point x of the front's unit frame is beyond a side where normal·x < least. */

@@ -124,8 +124,15 @@ static inline span box_span(const pl_front *front, float4 o, float4 d, float sla
     return s;
 }
 
-/* How far a ray may be from the box and still be told in single precision, and what its direction's length may be. */
-#define FAR 64.0f
+/* How far a ray may be from the box and still be told in single precision. Where there are instances, whose unit frames are as many
+ * times smaller as it becomes farther, it is brought near sooner. */
+static inline float far_of(const pl_front *front)
+{
+    return front->instance_count ? 64.0f : 256.0f;
+}
+
+/* Farther than this no ray is told, and its direction's length must be between these. */
+#define FARTHEST 1e12f
 #define SLOW 0x1p-20f
 #define FAST 0x1p20f
 
@@ -134,10 +141,16 @@ static inline float slack_of(const pl_frame *f, float far)
     return f->error + f->front->slack_gain * f->distance + f->front->slack_base + 0x1p-19f * (1.0f + far);
 }
 
-enum settled { BLIND, MISSES, SETTLED };
+/* Moves the ray along itself to where t is `enter` in the frame's own t. */
+static inline void move_along(pl_frame *f, float enter, float far)
+{
+    f->t0 += (double)enter / f->rate;
+    *(double4 *)f->o += (double)enter * *(const double4 *)f->d;
+    f->error += 0x1p-49f * (f->distance + far);
+}
 
-/* Brings the ray to where the box begins, and its direction to about unit length by a power of two. */
-static __attribute__((noinline)) enum settled settle(pl_frame *f, double t_max)
+/* Brings the direction to about unit length by a power of two. false: the ray can't be told in single precision. */
+static __attribute__((noinline)) bool normalise(pl_frame *f)
 {
     double largest = 0.0, far = 0.0;
     for (int axis = 0; axis < 3; axis++) {
@@ -146,53 +159,45 @@ static __attribute__((noinline)) enum settled settle(pl_frame *f, double t_max)
         far += __builtin_fabs(f->o[axis]);
     }
     const double shrink = inverse_power(largest), rate = f->rate * inverse_power(shrink);
-    if (!(far < 1e12 && rate > 1e-200 && rate < 1e200)) return BLIND;
-    const float slack = slack_of(f, (float)far);
-    if (!(slack < 1e6f)) return BLIND;
-    float4 o = {0}, d = {0};
-    for (int axis = 0; axis < 3; axis++) {
-        f->d[axis] *= shrink;
-        o[axis] = (float)f->o[axis];
-        d[axis] = (float)f->d[axis];
-    }
+    if (!(far < (double)FARTHEST && rate > 1e-200 && rate < 1e200)) return false;
+    for (int axis = 0; axis < 3; axis++) f->d[axis] *= shrink;
     f->rate = rate;
-    const span s = box_span(f->front, o, d, slack);
-    if (s.enter > s.leave || s.enter > local_t_max(f, t_max)) return MISSES;
-    f->t0 += (double)s.enter / rate;
-    for (int axis = 0; axis < 3; axis++) f->o[axis] += (double)s.enter * f->d[axis];
-    f->error += 0x1p-49f * (f->distance + (float)far);
-    return SETTLED;
+    return true;
 }
 
-/* Begins a frame with the ray of f->o and f->d; false if it misses the box.
+/* Begins a frame with the ray of f->o and f->d; false if it misses the box. What begins far from the box is brought there.
  *
  * In the unit frame a hit lies outside its exact box by no more than `slack`: the rounding of the chain below (front.h),
  * of the ray above (error), and of single precision, where 2^-19 is some 30 roundings. */
 static inline __attribute__((always_inline)) bool begin_frame(pl_frame *f, double4 o, double4 d, double t_max,
                                                               float *local_max)
 {
+    const bool filled = f->front->root != PL_NOTHING;
     float4 at = __builtin_convertvector(o, float4), along = __builtin_convertvector(d, float4);
     const float4 sums = sums_of(at, along);
-    float far = sums[0], size = sums[1];
+    const float far = sums[0], size = sums[1];
     *(double4 *)f->o = o;
     *(double4 *)f->d = d;
     f->mapped = f->blind = false;
-    if (__builtin_expect(!(far <= FAR && size >= SLOW && size <= FAST), 0)) {
-        enum settled result = settle(f, t_max);
-        if (result != SETTLED) {
+    if (__builtin_expect(!(far < FARTHEST && size >= SLOW && size <= FAST), 0)) {
+        if (!normalise(f)) {
             go_blind(f);
             *local_max = 1e30f;
-            return result == BLIND && f->front->root != PL_NOTHING;
+            return filled;
         }
-        at = __builtin_convertvector(*(const double4 *)f->o, float4);
         along = __builtin_convertvector(*(const double4 *)f->d, float4);
-        far = sums_of(at, along)[0];
         *local_max = local_t_max(f, t_max);
     }
     f->slack = slack_of(f, far);
     const span s = box_span(f->front, at, along, f->slack);
-    const bool told = f->slack < 1e6f, filled = f->front->root != PL_NOTHING;
+    const bool told = f->slack < 1e6f;
     if (told && s.enter <= s.leave && s.enter <= *local_max && filled) {
+        if (far > far_of(f->front)) {
+            move_along(f, s.enter, far);
+            at = __builtin_convertvector(*(const double4 *)f->o, float4);
+            f->slack = slack_of(f, sums_of(at, at)[0]);
+            *local_max = local_t_max(f, t_max);
+        }
         set_ray(f, at, s.along, s.inverse);
         return true;
     }

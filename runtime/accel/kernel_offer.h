@@ -144,8 +144,9 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     const pl_item *item = pl_front_item(&scene->states, p->item);
     const pl_item *leaf_item = pl_front_leaf_of(&scene->states, p, ref >> PL_REF_SHIFT);
     unsigned quads = quads_of(lanes);
-    /* Where rays go each their own way, most of them have a candidate sooner or later. */
-    if (!map_packet(scene, w, index, f->each ? quads_of(f->lanes) & ~f->mapped : quads, queries->error)) return false;
+    /* All at once, where most rays have a candidate sooner or later. */
+    const bool all = f->each && f->front->dense;
+    if (!map_packet(scene, w, index, all ? quads_of(f->lanes) & ~f->mapped : quads, queries->error)) return false;
     w->answers++;
     if (!(lanes & (lanes - 1))) return offer_lane(tracer, index, ref, __builtin_ctz(lanes), queries, t_max);
     size_t count;

@@ -104,29 +104,51 @@ static inline begun begin_box(pl_packet_frame *f, unsigned lanes, const double *
     return all;
 }
 
+/* Brings all rays of a frame to the t where the first of them enters the box, so that it is near their origins. false: it isn't for
+ * all. */
+static bool move_lanes(pl_packet_frame *f, float first_t, float far, const double *t_max)
+{
+    const __m256d t = _mm256_set1_pd((double)first_t);
+    const wide zero = wide_set(0.0f);
+    wide most = zero;
+    f->t0 += (double)first_t / f->rate;
+    for (int first = 0; first < PL_LANES; first += HALF) {
+        if (!(f->lanes >> first & 0xFF)) continue;
+        wide away = zero;
+#pragma GCC unroll 3
+        for (int axis = 0; axis < 3; axis++) {
+            double *o = f->o[axis] + first;
+            const double *d = f->d[axis] + first;
+            const __m256d low = _mm256_fmadd_pd(t, _mm256_loadu_pd(d), _mm256_loadu_pd(o));
+            const __m256d high = _mm256_fmadd_pd(t, _mm256_loadu_pd(d + 4), _mm256_loadu_pd(o + 4));
+            const wide origin = wide_narrow(low, high);
+            _mm256_storeu_pd(o, low);
+            _mm256_storeu_pd(o + 4, high);
+            _mm256_storeu_ps(f->origin[axis] + first, origin);
+            away += wide_absolute(origin);
+        }
+        most = wide_max(wide_and(away, wide_lanes(f->lanes >> first & 0xFF)), most);
+    }
+    set_t_max(f, t_max);
+    f->error += 0x1p-49f * (f->distance + far);
+    const float left = wide_most(most);
+    f->slack = packet_slack(f) + 0x1p-19f * left;
+    return left <= far_of(f->front);
+}
+
 /* Begins a frame with the rays f->o and f->d of some lanes: which of them meet the box, and how they go on. */
 static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double *t_max)
 {
     f->lanes = lanes;
     if (f->front->root == PL_NOTHING) return ASTRAY;
-    begun all = begin_box(f, lanes, t_max);
+    const begun all = begin_box(f, lanes, t_max);
     if (lanes & ~all.fit) return APART;
-    float far = wide_most(all.far);
+    const float far = wide_most(all.far);
     f->slack = packet_slack(f) + 0x1p-19f * far;
     if (!(f->slack < 1.0f)) return APART;
     f->lanes = all.met;
     if (!f->lanes) return ASTRAY;
-    if (far > FAR) { /* all go on together to where the first of them enters */
-        const double first_t = (double)wide_least(all.least);
-        f->t0 += first_t / f->rate;
-        for (int axis = 0; axis < 3; axis++)
-            for (int i = 0; i < PL_LANES; i++) f->o[axis][i] += first_t * f->d[axis][i];
-        f->error += 0x1p-49f * (f->distance + far);
-        all = begin_box(f, f->lanes, t_max);
-        far = wide_most(all.far);
-        if (f->lanes & ~all.fit || !(far <= FAR)) return APART;
-        f->slack = packet_slack(f) + 0x1p-19f * far;
-    }
+    if (far > far_of(f->front) && !move_lanes(f, wide_least(all.least), far, t_max)) return APART;
     return __builtin_popcount(f->lanes) <= FEW ? ONE_BY_ONE : TOGETHER;
 }
 
