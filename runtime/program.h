@@ -17,6 +17,7 @@
 #include "bytecode.h"
 #include "plsys.h"
 
+#include <math.h>
 #include <string.h>
 
 typedef struct pl_string {
@@ -60,6 +61,7 @@ typedef struct pl_case {
 typedef struct pl_transform {
     uint64_t form : 3;     /* pl_form of to_object */
     uint64_t singular : 1; /* the subtree below is to be dropped and counted */
+    uint64_t mild : 1;     /* the inverse changes no vector's length by more than 2^±4 */
     uint64_t codes : 48;   /* where it is PL_FORM_PACKED */
     pl_affine to_object;   /* the inverse; unspecified if singular */
     /* What follows is needed for building only: packed states (state.h) leave it out. */
@@ -105,12 +107,22 @@ static inline pl_form pl_form_of(const pl_affine *map)
     return PL_FORM_GENERAL;
 }
 
+/* Whether a map changes no vector's length by more than 2^±4: by its largest singular value, whose square is no larger than the sum of
+ * its entries' squares, and its smallest, no less than the determinant over that sum. */
+static inline bool pl_is_mild(const pl_affine *map)
+{
+    double squares = 0.0;
+    for (int i = 0; i < 12; i++) squares += i % 4 == 3 ? 0.0 : map->m[i] * map->m[i];
+    return squares < 256.0 && 16.0 * fabs(pl_affine_determinant(map)) > squares;
+}
+
 /* Sets to_parent and all that follows from it. */
 static inline void pl_transform_set(pl_transform *transform, const pl_affine *to_parent)
 {
     transform->to_parent = *to_parent;
     transform->singular = !pl_affine_inverse(to_parent, &transform->to_object);
     transform->form = transform->singular ? PL_FORM_GENERAL : pl_form_of(&transform->to_object);
+    transform->mild = !transform->singular && pl_is_mild(&transform->to_object);
 }
 
 /* Settings, camera, light or texture: PL_<RECORD>_VALUES numbers, then PL_<RECORD>_ENTRY numbers an entry. What the

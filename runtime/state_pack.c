@@ -93,6 +93,7 @@ static size_t pack_transform(const pl_transform *transform, pl_transform *packed
     }
     packed->form = PL_FORM_PACKED;
     packed->singular = false;
+    packed->mild = transform->mild;
     packed->codes = codes;
     return offsetof(pl_transform, to_object) + count * sizeof *packed->to_object.m;
 }

@@ -14,6 +14,9 @@
 /* How far below a cut instance its first primitive is looked for. */
 enum { CUT_DEPTH = 64, CUT_STEPS = 4096 };
 
+/* So many mild maps change a length by less than 2^±150. */
+enum { MILD_MAPS = 36 };
+
 /* What is known of the texture of the first primitive below a state; from FIRST_NODE on: its node, and it has neither
  * pattern nor code. */
 enum { FIRST_UNKNOWN, FIRST_WALK, FIRST_NONE, FIRST_NODE };
@@ -60,8 +63,8 @@ static bool take_texture(pl_tracer *tracer, double t, pl_surface *surface, pl_er
 }
 
 /* A normal above a transformation: by the inverse transpose (paper, section 2: only the foremost hit's normal is
- * transformed back). Its length is kept in range, so that no scale however deep overflows. */
-static inline void map_normal_back(const pl_transform *transform, double n[3])
+ * transformed back). */
+static inline __attribute__((always_inline)) void turn_normal_back(const pl_transform *transform, double n[3])
 {
     pl_affine room;
     const double *m = pl_transform_entries(transform, room.m);
@@ -69,16 +72,31 @@ static inline void map_normal_back(const pl_transform *transform, double n[3])
     if (transform->form <= PL_FORM_PACKED) pl_affine_normal((const pl_affine *)m, n, n);
     else
         for (int axis = 0; axis < 3; axis++) n[axis] *= m[5 * axis];
-    double size = fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
+}
+
+static inline double size_of(const double n[3])
+{
+    return fabs(n[0]) + fabs(n[1]) + fabs(n[2]);
+}
+
+/* The same, its length kept in range, so that no scale however deep overflows. */
+static inline void map_normal_back(const pl_transform *transform, double n[3])
+{
+    turn_normal_back(transform, n);
+    const double size = size_of(n);
     if (size > 0x1p-200 && size < 0x1p200) return;
     for (int axis = 0; axis < 3; axis++) n[axis] /= size;
 }
 
-/* The same up a leg; the copy stays in registers. */
+/* The same up a leg; the copy stays in registers. A mild leg leaves a length in range that is far from its ends. */
 static void map_up_leg(const pl_leg *leg, double normal[3])
 {
     double n[3] = {normal[0], normal[1], normal[2]};
-    for (uint32_t i = 0; i < leg->map_count; i++) map_normal_back(leg->maps[i], n);
+    const double size = size_of(n);
+    if (leg->mild && leg->map_count <= MILD_MAPS && size > 0x1p-50 && size < 0x1p50)
+        for (uint32_t i = 0; i < leg->map_count; i++) turn_normal_back(leg->maps[i], n);
+    else
+        for (uint32_t i = 0; i < leg->map_count; i++) map_normal_back(leg->maps[i], n);
     memcpy(normal, n, sizeof n);
 }
 

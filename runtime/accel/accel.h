@@ -92,6 +92,7 @@ typedef struct pl_leg {
     int32_t rule;           /* the innermost one, -1: none */
     uint32_t state;         /* the innermost one that is entered, UINT32_MAX: none … */
     uint32_t entered;       /* … and how many are */
+    bool mild;              /* none of its maps changes a normal's size by more than 2^±4 */
     uint32_t map_count;     /* transformations but translations, which leave normals alone … */
     const pl_transform *const *maps; /* … the innermost first */
 } pl_leg;

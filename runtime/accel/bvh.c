@@ -197,7 +197,7 @@ static bool is_alike(const pl_ray *first, const pl_ray *other, double scale)
     const double *d = first->direction, near = PL_ALIKE * (fabs(d[0]) + fabs(d[1]) + fabs(d[2]));
     for (int axis = 0; axis < 3; axis++) {
         const double along = other->direction[axis], apart = other->origin[axis] - first->origin[axis];
-        if (!(fabs(along - d[axis]) < near && fabs(apart) * scale < PL_ALIKE)) return false;
+        if (!(fabs(along - d[axis]) < near && fabs(apart) * scale < PL_NEAR)) return false;
     }
     return true;
 }

@@ -90,9 +90,10 @@ typedef bool pl_bvh_many_kernel(pl_tracer *tracer, const pl_ray *rays, pl_query 
 extern pl_bvh_many_kernel pl_bvh_packet_avx2;
 /* At most PL_STREAM. */
 extern pl_bvh_many_kernel pl_bvh_stream_scalar, pl_bvh_stream_avx2, pl_bvh_stream_avx512;
-/* Rays go well together as a packet where all directions lie about the first's, by this share of its size (sums of axes), and so
- * do the origins, by this share of half the size of what is traced. */
+/* Rays go well together as a packet where all directions lie about the first's, by this share of its size (sums of axes), and
+ * origins no farther away than this share of half the size of what is traced: shadow rays of a tile begin far apart in depth. */
 #define PL_ALIKE 0.125
+#define PL_NEAR 1.0
 
 /* Where a leaf is: frames 1 … frame of a lane, then a primitive. */
 typedef struct pl_bvh_place {

@@ -38,6 +38,7 @@ static bool join_item(pl_bvh_legs *legs, pl_leg *leg, const pl_item *item)
         if (item->transforms[i]->form == PL_FORM_TRANSLATION) continue;
         if (legs->used == MAPS) return false;
         legs->maps[legs->used++] = item->transforms[i];
+        leg->mild = leg->mild && item->transforms[i]->mild;
     }
     return true;
 }
@@ -49,7 +50,7 @@ static void make_leg(pl_bvh_legs *legs, const pl_states *states, const pl_front 
     const uint32_t item = enters ? front->places[index].item : front->primitives[index].item;
     uint32_t at = enters ? front->places[index].opened : front->primitives[index].opened;
     const pl_item *last = pl_front_item(states, item), *leaf = enters ? last : pl_front_leaf(states, last);
-    *leg = (pl_leg){.last = leaf, .rule = -1, .state = UINT32_MAX, .maps = legs->maps + begin};
+    *leg = (pl_leg){.last = leaf, .rule = -1, .state = UINT32_MAX, .mild = true, .maps = legs->maps + begin};
     bool known = join_item(legs, leg, leaf) && (leaf == last || join_item(legs, leg, last));
     for (; known && at; at = front->opened[at].parent)
         known = join_item(legs, leg, pl_front_item(states, front->opened[at].item));

@@ -420,7 +420,7 @@ static inline bool are_alike(const pl_lanes *rays, const pl_front *front)
         for (int i = 0; i < PL_LANES; i += 4) {
             const four along = _mm256_loadu_pd(rays->d[axis] + i), apart = _mm256_loadu_pd(rays->o[axis] + i) - o;
             alike = _mm256_and_pd(alike, _mm256_cmp_pd(four_absolute(along - d), four_set(near), _CMP_LT_OQ));
-            alike = _mm256_and_pd(alike, _mm256_cmp_pd(four_absolute(apart) * front->scale, four_set(PL_ALIKE), _CMP_LT_OQ));
+            alike = _mm256_and_pd(alike, _mm256_cmp_pd(four_absolute(apart) * front->scale, four_set(PL_NEAR), _CMP_LT_OQ));
         }
     }
     return _mm256_movemask_pd(alike) == 15;
