@@ -53,20 +53,22 @@ static inline void between_lanes(wide_interval *i, wide o, wide d, float lo, flo
     i->leave = wide_min(wide_max(a, b), i->leave);
 }
 
-/* As inside_quadric; lanes that miss get an empty interval. */
-static inline void quadric_lanes(wide_interval *i, wide a, wide b, wide discriminant)
+/* As inside_quadric; lanes that miss get an empty interval. false: all of `lanes` do, as most often, and roots aren't needed. */
+static inline bool quadric_lanes(wide_interval *i, unsigned lanes, wide a, wide b, wide discriminant)
 {
     const wide bent = _mm256_cmp_ps(a, wide_set(1e-30f), _CMP_GT_OQ), zero = wide_set(0.0f);
-    const wide root = _mm256_sqrt_ps(wide_max(discriminant, zero)), over = wide_set(1.0f) / a;
     const wide missed = wide_and(bent, _mm256_cmp_ps(discriminant, zero, _CMP_LT_OQ));
+    if (!(lanes & ~wide_mask_of(missed))) return false;
+    const wide root = _mm256_sqrt_ps(wide_max(discriminant, zero)), over = wide_set(1.0f) / a;
     const wide near_t = _mm256_blendv_ps(wide_set(-1e30f), (-b - root) * over, bent);
     const wide far_t = _mm256_blendv_ps(wide_set(1e30f), (root - b) * over, bent);
     i->enter = wide_max(near_t, i->enter);
     i->leave = _mm256_blendv_ps(wide_min(far_t, i->leave), wide_set(-2e30f), missed);
+    return true;
 }
 
-/* As shape_interval. */
-static inline void shape_lanes(uint32_t kind, float argument, const wide o[3], const wide d[3], float grow,
+/* As shape_interval, for `lanes`; false: nothing of any of these. */
+static inline bool shape_lanes(uint32_t kind, float argument, unsigned lanes, const wide o[3], const wide d[3], float grow,
                                wide_interval *i)
 {
     const wide flat = d[0] * d[0] + d[1] * d[1], cross = o[0] * d[1] - o[1] * d[0], along = o[0] * d[0] + o[1] * d[1];
@@ -74,23 +76,22 @@ static inline void shape_lanes(uint32_t kind, float argument, const wide o[3], c
     case PL_SHAPE_SPHERE: {
         const wide a = flat + d[2] * d[2], r = wide_set(1.0f + grow);
         const wide x = o[1] * d[2] - o[2] * d[1], y = o[2] * d[0] - o[0] * d[2];
-        quadric_lanes(i, a, along + o[2] * d[2], a * r * r - (x * x + y * y + cross * cross));
-        return;
+        return quadric_lanes(i, lanes, a, along + o[2] * d[2], a * r * r - (x * x + y * y + cross * cross));
     }
     case PL_SHAPE_DISC:
     case PL_SHAPE_CYLINDER:
     case PL_SHAPE_CONE: {
         const wide r = wide_set((kind == PL_SHAPE_CONE && argument > 1.0f ? argument : 1.0f) + grow);
+        if (!quadric_lanes(i, lanes, flat, along, flat * r * r - cross * cross)) return false;
         between_lanes(i, o[2], d[2], -grow, (kind == PL_SHAPE_DISC ? 0.0f : 1.0f) + grow);
-        quadric_lanes(i, flat, along, flat * r * r - cross * cross);
-        return;
+        return true;
     }
     case PL_SHAPE_TORUS: {
         const float r = 1.0f + argument + grow, h = argument + grow;
         between_lanes(i, o[0], d[0], -r, r);
         between_lanes(i, o[1], d[1], -r, r);
         between_lanes(i, o[2], d[2], -h, h);
-        return;
+        return true;
     }
     case PL_SHAPE_BOX:
     case PL_SHAPE_TRIANGLE:
@@ -98,8 +99,8 @@ static inline void shape_lanes(uint32_t kind, float argument, const wide o[3], c
         between_lanes(i, o[0], d[0], -grow, 1.0f + grow);
         between_lanes(i, o[1], d[1], -grow, 1.0f + grow);
         between_lanes(i, o[2], d[2], -grow, (kind == PL_SHAPE_BOX ? 1.0f : 0.0f) + grow);
-        return;
-    default: return;
+        return true;
+    default: return true;
     }
 }
 
@@ -109,7 +110,7 @@ static inline unsigned certain_lanes(uint32_t kind, const wide o[3], const wide 
 {
     if (!(kind == PL_SHAPE_CYLINDER || kind == PL_SHAPE_SPHERE || kind == PL_SHAPE_BOX) || !(margin < 0.25f)) return 0;
     wide_interval deep = {wide_set(-1e30f), wide_set(1e30f)};
-    shape_lanes(kind, 0.0f, o, d, -margin, &deep);
+    if (!shape_lanes(kind, 0.0f, 0xFF, o, d, -margin, &deep)) return 0;
     wide sure = wide_and(_mm256_cmp_ps(i->enter, wide_set(0.0f), _CMP_GT_OQ), _mm256_cmp_ps(deep.enter, deep.leave, _CMP_LT_OQ));
     sure = wide_and(sure, _mm256_cmp_ps(deep.enter, t_max * wide_set(0.9999f), _CMP_LT_OQ));
     if (kind == PL_SHAPE_CYLINDER) sure = wide_and(sure, _mm256_cmp_ps(d[0] * d[0] + d[1] * d[1], wide_set(1e-30f), _CMP_GT_OQ));
@@ -137,7 +138,7 @@ static inline unsigned filter_lanes(const pl_front_primitive *p, uint32_t kind, 
             d[r] = wide_multiply_add(a, u, wide_multiply_add(b, v, c * w));
         }
         wide_interval i = {wide_set(-1e30f), wide_set(1e30f)};
-        shape_lanes(kind, p->argument, o, d, margin, &i);
+        if (!shape_lanes(kind, p->argument, lanes >> first & 0xFF, o, d, margin, &i)) continue;
         const wide latest = wide_min(i.leave, wide_load(f->t_max + first));
         const wide met = wide_and(_mm256_cmp_ps(i.enter, latest, _CMP_LE_OQ),
                                   _mm256_cmp_ps(i.leave, wide_set(0.0f), _CMP_GE_OQ));
