@@ -2,7 +2,8 @@
  *
  * The last rungs, of K = 1, are those of all states that items lead to. Larger ones cost memory, so they are made only of the
  * states that the largest fronts lead to, from the scene's own on: where a ray has come to a state between those, it
- * goes on by single items until it meets the next of them. */
+ * goes on by single items until it meets the next of them. Nor are there any of states that occur so small that gates within
+ * them are closed in a picture of the whole scene. */
 #include "gated.h"
 
 #include <stdlib.h>
