@@ -67,6 +67,23 @@ def test_company_does_not_show(name, arranged):
 
 
 @pytest.mark.parametrize("arranged", [bundles, scattered])
+@pytest.mark.parametrize("far, length", [(30, 1), (1e3, 1e-9), (1e5, 1e9), (1e9, 1), (1e14, 1)])
+@pytest.mark.parametrize("name", ["tree", "menger"])
+def test_company_from_far_away_does_not_show(name, far, length, arranged):
+    """Rays to the same points from eyes that are `far` times as far away; a direction's length counts in t only."""
+    data = compile(ROOT / "scenes" / f"{name}.plsys", parameters=SCENES[name])
+    eyes, directions = arranged(data, 4)
+    centre, _ = middle(data)
+    origins = centre + far * (eyes - centre)
+    directions = length * (eyes + directions - origins)
+    expected = answers(data, origins, directions, accelerator="boxes")
+    assert np.isfinite(expected["t"]).any()
+    for items in (1, 21, ALL):
+        for isa in available(data):
+            assert_same(answers(data, origins, directions, front_items=items, isa=isa), expected, (items, isa))
+
+
+@pytest.mark.parametrize("arranged", [bundles, scattered])
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
 @given(text=scenes(), seed=st.integers(0, 2**32))
 def test_random_scenes_are_the_same_in_company(arranged, text, seed):
