@@ -276,10 +276,9 @@ static inline bool enter_lanes(pl_tracer *tracer, uint32_t index, unsigned lanes
     return course < ONE_BY_ONE || visit_one_by_one(tracer, index, f->lanes, course, queries, t_max, any);
 }
 
-/* Goes on with a frame, some of whose rays may have met something. */
-static inline void go_on(pl_packet_frame *f, const pl_bvh_work *w, const pl_query *queries, const double *t_max, bool any)
+/* A frame after some of its rays have met something. */
+static void take_answers(pl_packet_frame *f, const pl_bvh_work *w, const pl_query *queries, const double *t_max, bool any)
 {
-    if (f->answers == w->answers) return;
     f->answers = w->answers;
     if (any) {
         const unsigned left = lanes_left(queries, f->lanes);
@@ -290,6 +289,13 @@ static inline void go_on(pl_packet_frame *f, const pl_bvh_work *w, const pl_quer
         f->lanes = left;
     }
     set_t_max(f, t_max);
+}
+
+/* Goes on with a frame; in line, as it mostly has nothing to do. */
+static inline __attribute__((always_inline)) void go_on(pl_packet_frame *f, const pl_bvh_work *w, const pl_query *queries,
+                                                        const double *t_max, bool any)
+{
+    if (f->answers != w->answers) take_answers(f, w, queries, t_max, any);
 }
 
 /* The same after a primitive was offered to some lanes only. */
