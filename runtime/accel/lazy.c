@@ -18,8 +18,9 @@
 #define MOST_WORK (UINT64_C(1) << 24)
 enum { MOST_UNKNOWN = PL_LIMIT_DEPTH + 1024 };
 
-/* Symbols on the path of rays that go together, with 20 MB of frames: deeper they go alone, which takes an eighth of it. */
-enum { DEEPEST_TOGETHER = 8192 };
+/* Rays that go together have this part of each limit. Beyond it each goes alone, since one of them may have the error; that
+ * what they did was in vain costs little then, and 8,192 symbols deep they have 20 MB of frames. */
+enum { PART_TOGETHER = 32 };
 
 static void work_destroy(void *memory)
 {
@@ -202,8 +203,7 @@ static bool enter(pl_tracer *tracer, pl_lazy_item *it, pl_error *error)
     const uint32_t index = (uint32_t)w->frame_count;
     frame *f = &w->frames[index];
     f->symbol = it ? it->what : UINT32_MAX;
-    if (index > DEEPEST_TOGETHER && w->fours > 1) return false;
-    if (index > PL_LIMIT_DEPTH)
+    if (index > PL_LIMIT_DEPTH / w->part)
         return pl_fail_at(error, PL_ERROR_LIMIT, tracer->scene->program, f->symbol,
                           "depth: a ray came %d symbols deep, which is the limit; does the recursion end?", PL_LIMIT_DEPTH);
     f->state = it ? atomic_load_explicit(&it->state, memory_order_acquire) : NULL;
@@ -215,7 +215,7 @@ static bool enter(pl_tracer *tracer, pl_lazy_item *it, pl_error *error)
         if (!state) return false;
         if (it && w->changes == changes) atomic_store_explicit(&it->state, state, memory_order_release);
     }
-    if (w->spent > MOST_WORK)
+    if (w->spent > MOST_WORK / w->part)
         return fail_work(tracer->scene, f->symbol, "needed to visit more nodes of the graph than", MOST_WORK, error);
     return push_items(w, index, tracer->scene->gates != NULL, &tracer->counters, error);
 }
@@ -321,6 +321,7 @@ static bool begin(work *w, const pl_scene *scene, const pl_ray *rays, pl_query *
     uint32_t slot;
     w->queries = queries;
     w->fours = (count + 3) / 4;
+    w->part = count > 1 ? PART_TOGETHER : 1;
     w->all = UINT32_MAX >> (32 - count);
     w->stack_count = w->frame_count = w->slot_count = w->free_count = w->path.length = w->unknown = 0;
     w->spent = w->found = 0;
@@ -356,7 +357,7 @@ static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries,
     bool ok = enter(tracer, NULL, error);
     for (uint64_t steps = 0; ok && w->stack_count && w->all; steps++) {
         pending at = w->stack[--w->stack_count];
-        if (steps > PL_LIMIT_RAY_STEPS) ok = pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
+        if (steps > PL_LIMIT_RAY_STEPS / w->part) ok = pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
         at.rays = w->kernel->waiting(&w->wants, rays_at(w, at.slot), at.rays);
         if (!at.rays) {
             give_slot(w, at.slot);

@@ -43,6 +43,7 @@ typedef struct work {
     pl_query *queries;
     pl_lazy_wants wants;
     uint32_t fours, all; /* of rays, and all of these */
+    uint32_t part; /* limits are divided by it */
     frame *frames;
     pl_span *inside; /* with cut-offs: of what stands below a frame, for each ray of the fours */
     pending *stack;
