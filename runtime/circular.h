@@ -118,10 +118,9 @@ typedef struct part_angle {
 
 static inline part_angle take_apart(double degrees)
 {
-    static const double RADIAN = 0x1.1df46a2529d39p-6;
     const double size = fabs(degrees);
     const int below = (int)size, whole = below + (size - below > 0.5); /* the rest is exact (Sterbenz) */
-    const double r = size - whole, half = upper(r), x = RADIAN * r, z = x * x;
+    const double r = size - whole, half = upper(r), x = RADIANS.high * r, z = x * x;
     return (part_angle){
         .sine = &WHOLE_DEGREES[whole],
         .cosine = &WHOLE_DEGREES[90 - whole],

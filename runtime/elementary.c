@@ -95,8 +95,6 @@ static inline pair negate(pair a)
     return (pair){-a.high, -a.low};
 }
 
-#include "circular.h"
-
 /* --- exponents --- */
 
 static inline uint64_t bits_of(double a)
@@ -164,6 +162,8 @@ static double join(pair a, int exponent)
 static const pair RADIANS = {0x1.1df46a2529d39p-6, 0x1.5c1d8becdd291p-62};  /* pi / 180 */
 static const pair DEGREES = {0x1.ca5dc1a63c1f8p+5, -0x1.1e7ab456405f9p-49}; /* 180 / pi */
 static const pair THIRD = {0x1.5555555555555p-2, 0x1.5555555555555p-56};
+
+#include "circular.h"
 
 /* a * constant, rounded once, for every finite a != 0. */
 static double scaled(double a, pair constant)
