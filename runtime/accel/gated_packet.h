@@ -215,34 +215,14 @@ static inline bool gated_meet_primitive(pl_tracer *tracer, uint32_t index, pl_re
 static inline bool gated_visit_packet(pl_tracer *tracer, gated_crowd *c)
 {
     pl_bvh_work *b = ((pl_gated_work *)tracer->work)->packets;
-    pl_error *error = c->queries->error;
     pl_packet_frame *f = b->packets;
-    uint64_t *stack = b->packet_stack, steps = 0;
-    uint32_t *own = b->packet_lanes, index = 0;
-    size_t top = 0;
-    stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
-    own[top] = UINT32_MAX;
-    stack[top++] = entry_of(0.0f, f->front->root);
+    packet_way way = way_of(b);
+    uint32_t index = 0;
+    push_front(&way, f->front);
     for (;;) {
-        const uint64_t at = stack[--top];
-        pl_ref ref = (pl_ref)at;
-        unsigned some = f->lanes;
-        if (f->each) some &= own[top] & lanes_within(f, at);
-        else if (entry_is_beyond(at, f->most)) continue;
-        if (!some && ref >> PL_REF_SHIFT != PL_KIND_RETURN) continue;
-        while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
-            const pl_front_node *node = &f->front->nodes[ref];
-            const unsigned count = f->each ? meet_each(f, &some, node, stack + top, own + top, &ref)
-                                           : meet_beam(&f->beam, f->most, node, stack + top, &ref);
-            steps++;
-            if (count == 0) goto next;
-            top += count - 1;
-            if (top + 16 > b->packet_stack_capacity) {
-                if (!pl_bvh_grow_packet_stack(b, top, error)) return false;
-                stack = b->packet_stack;
-                own = b->packet_lanes;
-            }
-        }
+        pl_ref ref;
+        unsigned some;
+        if (!go_through_nodes(&way, b, f, &ref, &some, c->queries->error)) return false;
         const uint32_t kind = ref >> PL_REF_SHIFT;
         if (kind == PL_KIND_RETURN) {
             if (index == 0) break;
@@ -257,19 +237,16 @@ static inline bool gated_visit_packet(pl_tracer *tracer, gated_crowd *c)
             f = &b->packets[index]; /* which may have moved */
             if (goes_on) {
                 f = &b->packets[++index];
-                stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
-                own[top] = UINT32_MAX;
-                stack[top++] = entry_of(0.0f, f->front->root);
+                push_front(&way, f->front);
             } else {
                 go_on(f, b, c->queries, c->t_max, c->any);
             }
         } else if (!gated_meet_primitive(tracer, index, ref, some, c)) {
             return false;
         }
-        if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(c->queries, PL_LIMIT_RAY_STEPS);
-    next:;
+        if (++way.steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(c->queries, PL_LIMIT_RAY_STEPS);
     }
-    tracer->counters.box_tests += steps * PL_FRONT_WIDTH;
+    tracer->counters.box_tests += way.steps * PL_FRONT_WIDTH;
     return true;
 }
 

@@ -310,44 +310,25 @@ static inline void go_on_each(pl_packet_frame *f, const pl_bvh_work *w, unsigned
     }
 }
 
+#include "kernel_through.h"
+
 static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *queries, double *t_max, bool any)
 {
     pl_bvh_work *w = tracer->work;
     const pl_fronts *fronts = tracer->scene->structure;
     const bool shadow = queries->shadow;
     pl_error *error = queries->error;
-    uint64_t steps = 0;
     uint32_t index = 0;
-    size_t top = 0;
     bool goes_on;
     if (!enter_lanes(tracer, 0, lanes, queries, t_max, any, &goes_on)) return false;
     if (!goes_on) return true;
     pl_packet_frame *f = &w->packets[0];
-    uint64_t *stack = w->packet_stack;
-    uint32_t *own = w->packet_lanes;
-    stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
-    own[top] = UINT32_MAX;
-    stack[top++] = entry_of(0.0f, f->front->root);
+    packet_way way = way_of(w);
+    push_front(&way, f->front);
     for (;;) {
-        const uint64_t at = stack[--top];
-        pl_ref ref = (pl_ref)at;
-        unsigned some = f->lanes;
-        if (f->each) some &= own[top] & lanes_within(f, at);
-        else if (entry_is_beyond(at, f->most)) continue;
-        if (!some && ref >> PL_REF_SHIFT != PL_KIND_RETURN) continue;
-        while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
-            const pl_front_node *node = &f->front->nodes[ref];
-            const unsigned count = f->each ? meet_each(f, &some, node, stack + top, own + top, &ref)
-                                           : meet_beam(&f->beam, f->most, node, stack + top, &ref);
-            steps++;
-            if (count == 0) goto next;
-            top += count - 1;
-            if (top + 16 > w->packet_stack_capacity) {
-                if (!pl_bvh_grow_packet_stack(w, top, error)) return false;
-                stack = w->packet_stack;
-                own = w->packet_lanes;
-            }
-        }
+        pl_ref ref;
+        unsigned some;
+        if (!go_through_nodes(&way, w, f, &ref, &some, error)) return false;
         const uint32_t kind = ref >> PL_REF_SHIFT;
         if (kind == PL_KIND_RETURN) {
             if (index == 0) break;
@@ -368,13 +349,11 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
             if (!enter_lanes(tracer, index + 1, some, queries, t_max, any, &goes_on)) return false;
             if (goes_on) {
                 f = &w->packets[++index];
-                stack[top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
-                own[top] = UINT32_MAX;
-                stack[top++] = entry_of(0.0f, f->front->root);
+                push_front(&way, f->front);
             } else {
                 go_on(f, w, queries, t_max, any);
             }
-            if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
+            if (++way.steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
         } else {
             const pl_front_primitive *p = &f->front->primitives[ref & PL_REF_INDEX];
             if (shadow && p->item & PL_NO_SHADOW) continue;
@@ -390,11 +369,10 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
             if (found & ~certain && !offer_lanes(tracer, index, ref, found & ~certain, queries, t_max)) return false;
             if (f->each) go_on_each(f, w, found, queries, t_max, any);
             else go_on(f, w, queries, t_max, any);
-            if (++steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
+            if (++way.steps > PL_LIMIT_RAY_STEPS) return pl_query_fail_steps(queries, PL_LIMIT_RAY_STEPS);
         }
-    next:;
     }
-    tracer->counters.box_tests += steps * PL_FRONT_WIDTH;
+    tracer->counters.box_tests += way.steps * PL_FRONT_WIDTH;
     return true;
 }
 
