@@ -8,7 +8,15 @@
  * of the second the product of upper halves is exact, and their sum is. All else is below 2^-14 of the result and so needs no more
  * than a double: the relative error is below 2^-64. Without such a table it would take two Taylor series in double-double,
  * which cost five times as much. */
+#ifndef PL_CIRCULAR_H
+#define PL_CIRCULAR_H
+
 #include <math.h>
+
+#include "double_double.h"
+
+static const pair RADIANS = {0x1.1df46a2529d39p-6, 0x1.5c1d8becdd291p-62};  /* pi / 180 */
+static const pair DEGREES = {0x1.ca5dc1a63c1f8p+5, -0x1.1e7ab456405f9p-49}; /* 180 / pi */
 
 /* The sine s = high + low of each whole degree, and s · pi/180 = scaled + rest, where `scaled` has 26 bits. */
 typedef struct whole_degree {
@@ -171,3 +179,5 @@ static inline void sine_and_cosine(double degrees, pair *s, pair *c)
     *s = sine_of(&at, degrees);
     *c = cosine_of(&at);
 }
+
+#endif

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # Headers of the runtime by layer, lowest first: a header includes its own layer and those below. trace.h stands low because
 # it is a contract only: rays and hits, which the derivation knows too.
 LAYERS = [
-    ["include/plsys.h", "bytecode.h", "affine.h", "array.h", "random.h", "elementary.h", "circular.h", "error.h", "box.h", "table.h", "vector.h"],
+    ["include/plsys.h", "bytecode.h", "affine.h", "array.h", "random.h", "elementary.h", "double_double.h", "circular.h", "error.h", "box.h", "table.h", "vector.h"],
     ["program.h", "reader.h", "expression.h", "derive_memo.h", "trace.h"],
     ["shapes/*.h"],
     ["derive.h", "state.h", "reach.h", "coverage.h", "cut.h", "interval.h", "hull.h", "class.h"],
