@@ -9,12 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "coverage.h"
 #include "array.h"
 #include "error.h"
-#include "random.h"
-
-enum { FIRST_TABLE = 64, FIRST_BLOCK = 4096, LARGEST_BLOCK = 1 << 20 };
 
 typedef struct visit {
     uint32_t state, next_item;
@@ -38,39 +34,7 @@ typedef struct builder {
     pl_error *error;
 } builder;
 
-/* --- memory --- */
-
-static bool over_limit(const pl_states *states, size_t more, pl_error *error)
-{
-    if (states->bytes + more <= states->limit) return false;
-    pl_fail(error, PL_ERROR_LIMIT, "states", "memory: %u states need more than the %zu bytes allowed",
-            (unsigned)states->count, states->limit);
-    return true;
-}
-
-void *pl_states_allocate(pl_states *states, size_t bytes, pl_error *error)
-{
-    bytes = (bytes + 15) & ~(size_t)15;
-    struct pl_block *block = states->blocks;
-    if (!block || block->used + bytes > block->size) {
-        size_t size = block ? 2 * block->size : FIRST_BLOCK;
-        if (size > LARGEST_BLOCK) size = LARGEST_BLOCK;
-        while (size > bytes && states->bytes + sizeof *block + size > states->limit) size /= 2;
-        if (size < bytes) size = bytes;
-        if (over_limit(states, size, error)) return NULL;
-        struct pl_block *fresh = malloc(sizeof *fresh + size);
-        if (!fresh) {
-            pl_fail_memory(error, "building the states");
-            return NULL;
-        }
-        *fresh = (struct pl_block){.next = block, .size = size};
-        states->blocks = block = fresh;
-        states->bytes += sizeof *fresh + size;
-    }
-    void *place = block->memory + block->used;
-    block->used += bytes;
-    return place;
-}
+/* --- one application --- */
 
 static void *keep(builder *b, const void *data, size_t bytes)
 {
@@ -89,134 +53,6 @@ static pl_item *keep_items(builder *b)
     b->states->blocks = others;
     return items;
 }
-
-void pl_blocks_free(struct pl_block *blocks)
-{
-    while (blocks) {
-        struct pl_block *next = blocks->next;
-        free(blocks);
-        blocks = next;
-    }
-}
-
-void pl_states_free(pl_states *states)
-{
-    pl_blocks_free(states->blocks);
-    free(states->list);
-    free(states->table);
-    free(states->node_boxes);
-    pl_coverage_free(states->coverage);
-    memset(states, 0, sizeof *states);
-}
-
-/* --- the table --- */
-
-/* Word i of the key of a scope at a symbol node. */
-static uint64_t key_word(const pl_program *program, uint32_t symbol, const pl_scope *scope, uint32_t i)
-{
-    const pl_node *node = &program->nodes[symbol];
-    if (i == 0) return symbol;
-    if (i > node->as.symbol.live_count) return node->as.symbol.draws ? scope->key : 0;
-    double value = scope->parameters[program->slots[node->as.symbol.live_first + i - 1]];
-    return isnan(value) ? UINT64_MAX : pl_bits(value);
-}
-
-/* The key of the state that a scope leads to at a symbol node: symbol · live parameters · random key. */
-static bool make_key(builder *b, uint32_t symbol, const pl_scope *scope)
-{
-    const pl_program *program = b->states->program;
-    const pl_node *node = &program->nodes[symbol];
-    uint32_t words = node->as.symbol.live_count + 2;
-    b->key.count = 0;
-    uint64_t *key = pl_array_extend(&b->key, words);
-    if (!key) return pl_fail_memory(b->error, "building the states");
-    for (uint32_t i = 0; i < words; i++) key[i] = key_word(program, symbol, scope, i);
-    return true;
-}
-
-static uint64_t hash_key(const uint64_t *key, size_t words)
-{
-    uint64_t hash = 0;
-    for (size_t i = 0; i < words; i++) hash = pl_mix(hash, key[i]);
-    return hash;
-}
-
-static size_t key_words(const pl_states *states, uint32_t symbol)
-{
-    return states->program->nodes[symbol].as.symbol.live_count + 2;
-}
-
-uint32_t pl_states_find(const pl_states *states, uint32_t symbol, const pl_scope *scope)
-{
-    size_t words = key_words(states, symbol);
-    uint64_t hash = 0;
-    for (uint32_t i = 0; i < words; i++) hash = pl_mix(hash, key_word(states->program, symbol, scope, i));
-    uint32_t mask = states->table_size - 1;
-    for (uint32_t slot = (uint32_t)hash & mask; states->table_size && states->table[slot]; slot = (slot + 1) & mask) {
-        const pl_state *state = &states->list[states->table[slot] - 1];
-        uint32_t i = 0;
-        while (state->symbol == symbol && i < words && state->bounds->key[i] == key_word(states->program, symbol, scope, i)) i++;
-        if (i == words) return states->table[slot] - 1;
-    }
-    return UINT32_MAX;
-}
-
-/* The slot of b->key in the table: taken by its state or free. */
-static uint32_t find_slot(const pl_states *states, const uint64_t *key)
-{
-    size_t words = key_words(states, (uint32_t)key[0]);
-    uint32_t mask = states->table_size - 1, slot = (uint32_t)hash_key(key, words) & mask;
-    for (; states->table[slot]; slot = (slot + 1) & mask) {
-        const pl_state *state = &states->list[states->table[slot] - 1];
-        if (state->symbol == (uint32_t)key[0] && memcmp(state->bounds->key, key, words * sizeof *key) == 0) break;
-    }
-    return slot;
-}
-
-static bool grow_table(pl_states *states, pl_error *error)
-{
-    uint32_t size = states->table_size ? 2 * states->table_size : FIRST_TABLE;
-    uint32_t *table = calloc(size, sizeof *table), *old = states->table;
-    if (!table) return pl_fail_memory(error, "building the states");
-    states->bytes += (size - states->table_size) * sizeof *table;
-    states->table = table;
-    states->table_size = size;
-    for (uint32_t i = 0; i < states->count; i++)
-        if (states->list[i].bounds->key) table[find_slot(states, states->list[i].bounds->key)] = i + 1;
-    free(old);
-    return true;
-}
-
-/* A new, empty state at the end of the list. */
-static pl_state *add_state(builder *b, uint32_t symbol, const uint64_t *key)
-{
-    pl_states *states = b->states;
-    if (states->count >= states->most) {
-        pl_fail(b->error, PL_ERROR_LIMIT, "states", "more than %u states", (unsigned)states->most);
-        return NULL;
-    }
-    if (states->count == states->capacity) {
-        uint32_t capacity = states->capacity ? 2 * states->capacity : 16;
-        size_t more = (capacity - states->capacity) * sizeof *states->list;
-        if (over_limit(states, more, b->error)) return NULL;
-        pl_state *list = realloc(states->list, capacity * sizeof *list);
-        if (!list) {
-            pl_fail_memory(b->error, "building the states");
-            return NULL;
-        }
-        states->list = list;
-        states->capacity = capacity;
-        states->bytes += more;
-    }
-    pl_state_bounds *bounds = pl_states_allocate(states, sizeof *bounds, b->error);
-    if (!bounds) return NULL;
-    *bounds = (pl_state_bounds){.box = pl_box_empty(), .key = key};
-    pl_state *state = &states->list[states->count++];
-    *state = (pl_state){.symbol = symbol, .bounds = bounds, .open = true};
-    return state;
-}
-
-/* --- one application --- */
 
 static bool remember_transform(builder *b)
 {
@@ -335,7 +171,7 @@ static bool begin_visit(builder *b, uint32_t symbol, const uint64_t *key)
                           PL_LIMIT_DEPTH);
     visit v = {b->states->count, 0, b->states->count, b->scopes.count, b->scopes.count};
     open_state open = {b->states->count, b->trails.count, b->trail_counts.count};
-    if (!add_state(b, symbol, key) || !derive_items(b)) return false;
+    if (!pl_states_add(b->states, symbol, key, b->error) || !derive_items(b)) return false;
     pl_item *items = keep_items(b);
     visit *place = pl_array_extend(&b->visits, 1);
     open_state *open_place = pl_array_extend(&b->open, 1);
@@ -441,10 +277,7 @@ static bool finish_component(builder *b, size_t first)
         if (cyclic) state->primitives = UINT64_MAX, state->depth = UINT32_MAX;
         bound_items(b, &open[i], cyclic);
         if (states->node_boxes && state->symbol != UINT32_MAX && !state->endless) pl_join_symbol_box(states, open[i].state);
-        double square = 0.0;
-        for (int axis = 0; axis < 3 && !pl_box_is_empty(&state->bounds->box); axis++)
-            square += (state->bounds->box.hi[axis] - state->bounds->box.lo[axis]) * (state->bounds->box.hi[axis] - state->bounds->box.lo[axis]);
-        state->bounds->diameter = sqrt(square);
+        state->bounds->diameter = pl_box_diameter(&state->bounds->box);
     }
     for (size_t i = 0; i < count; i++) states->list[open[i].state].open = false;
     b->trails.count = open->trails;
@@ -465,8 +298,11 @@ static bool resolve_item(builder *b, visit *v)
     const uint64_t *words = (const uint64_t *)b->scopes.data + v->cursor;
     pl_scope_unpack(states->program, words, &b->scope);
     v->cursor += pl_scope_words(states->program, &b->scope);
-    if (!make_key(b, symbol, &b->scope)) return false;
-    uint32_t slot = find_slot(states, b->key.data);
+    b->key.count = 0;
+    uint64_t *wanted = pl_array_extend(&b->key, pl_states_key_words(states, symbol));
+    if (!wanted) return pl_fail_memory(b->error, "building the states");
+    pl_states_key(states, symbol, &b->scope, wanted);
+    uint32_t slot = pl_states_slot(states, wanted);
     if (states->table[slot]) {
         item->what = states->table[slot] - 1;
         if (!states->list[item->what].open) return true;
@@ -474,18 +310,18 @@ static bool resolve_item(builder *b, visit *v)
         if (item->what < v->lowest) v->lowest = item->what;
         return true;
     }
-    uint64_t *key = keep(b, b->key.data, b->key.count * sizeof *key);
+    uint64_t *key = keep(b, wanted, b->key.count * sizeof *key);
     if (!key) return false;
     item->what = states->count;
     states->table[slot] = states->count + 1;
     pl_walk_restart(&b->walk, symbol, &b->scope);
     if (!begin_visit(b, symbol, key)) return false;
-    return 2 * (uint64_t)states->count < states->table_size || grow_table(states, b->error);
+    return 2 * (uint64_t)states->count < states->table_size || pl_states_grow_table(states, b->error);
 }
 
 static bool explore(builder *b)
 {
-    if (!grow_table(b->states, b->error) || !begin_visit(b, UINT32_MAX, NULL)) return false;
+    if (!pl_states_grow_table(b->states, b->error) || !begin_visit(b, UINT32_MAX, NULL)) return false;
     while (b->visits.count) {
         visit *v = (visit *)b->visits.data + b->visits.count - 1;
         if (v->next_item < b->states->list[v->state].item_count) {

@@ -116,8 +116,16 @@ bool pl_states_packed_bytes(const pl_states *states, size_t *bytes, pl_error *er
  * the number of symbols entered where the path ends at an instance of a state: then its first primitive's. */
 uint64_t pl_states_locate(const pl_states *states, const pl_path *path, uint32_t depth);
 
-/* The state that a scope leads to at a symbol node; UINT32_MAX if there is none. */
+/* The key of the state that a scope leads to at a symbol node, and its words: symbol · live parameters · random key. */
+size_t pl_states_key_words(const pl_states *states, uint32_t symbol);
+void pl_states_key(const pl_states *states, uint32_t symbol, const pl_scope *scope, uint64_t *key);
+/* That state; UINT32_MAX if there is none. */
 uint32_t pl_states_find(const pl_states *states, uint32_t symbol, const pl_scope *scope);
+/* The slot of a key in the table: its state's or a free one. */
+uint32_t pl_states_slot(const pl_states *states, const uint64_t *key);
+bool pl_states_grow_table(pl_states *states, pl_error *error);
+/* A new, empty state at the end of the list; the key stays the caller's. */
+bool pl_states_add(pl_states *states, uint32_t symbol, const uint64_t *key, pl_error *error);
 
 /* Boxes and gates of states that enter each other for ever (endless.c). 1: done; 0: not every way round contracts; -1: an
  * error. */
