@@ -125,12 +125,6 @@ static inline double support_at(const pl_hull *hull, const cell *at, int side)
     return (at->weights[0] * h[0] + at->weights[1] * h[side * at->step] + at->weights[2] * h[side * at->across]) * at->scale;
 }
 
-static inline double support_along(const pl_hull *hull, const double v[3])
-{
-    const cell at = cell_of(v);
-    return support_at(hull, &at, 1);
-}
-
 /* How far roundings may move a point, along a unit of each axis, that is mapped from within `reach`. Not in proportion to the result:
  * terms may have cancelled each other out. */
 static double slack_under(const pl_affine *to_parent, double reach)
@@ -148,21 +142,41 @@ static double turn_back(const pl_affine *to_parent, const double d[3], double v[
     return d[0] * m[3] + d[1] * m[7] + d[2] * m[11];
 }
 
-/* The support in direction d of the set mapped. */
-static double support_under(const pl_affine *to_parent, const pl_hull *hull, const double d[3])
+/* The supports of a set in a direction and in the opposite one, which lie on the lattice alike. */
+typedef struct both_ways {
+    double ahead, behind;
+} both_ways;
+
+static inline both_ways both_along(const pl_hull *hull, const double v[3])
+{
+    const cell at = cell_of(v);
+    return (both_ways){support_at(hull, &at, 1), support_at(hull, &at, -1)};
+}
+
+static inline both_ways larger_ways(both_ways a, both_ways b)
+{
+    return (both_ways){b.ahead > a.ahead ? b.ahead : a.ahead, b.behind > a.behind ? b.behind : a.behind};
+}
+
+/* Of the set mapped. */
+static inline both_ways both_under(const pl_affine *to_parent, const pl_hull *hull, const double d[3])
 {
     double v[3];
     const double move = turn_back(to_parent, d, v);
-    return support_along(hull, v) + move;
+    const both_ways below = both_along(hull, v);
+    return (both_ways){below.ahead + move, below.behind - move};
 }
 
 void pl_hull_through(const pl_affine *to_parent, pl_hull *hull)
 {
     const pl_hull below = *hull;
     const double slack = N * slack_under(to_parent, reach_of(&below));
-    for (int i = 0; i < PL_HULL_CELLS; i++) {
+    for (int i = 0; i < PL_HULL_MIDDLE; i++) {
         double d[3];
-        if (direction_of(i, d)) hull->support[i] = support_under(to_parent, &below, d) + slack;
+        if (!direction_of(i, d)) continue;
+        const both_ways mapped = both_under(to_parent, &below, d);
+        hull->support[i] = mapped.ahead + slack;
+        hull->support[PL_HULL_CELLS - 1 - i] = mapped.behind + slack;
     }
 }
 
@@ -270,10 +284,10 @@ static bool corners_of_steps(const pl_range_map *map, corners *c)
     return ok;
 }
 
-/* The support in direction d below a matrix of ranges, a bound that knows nothing of how its entries belong together. */
-static double support_under_entries(const pl_range_map *map, const pl_hull *below, double reach, const double d[3])
+/* The supports below a matrix of ranges, bounds that know nothing of how its entries belong together. */
+static both_ways both_under_entries(const pl_range_map *map, const pl_hull *below, double reach, const double d[3])
 {
-    double lo[4], hi[4], size = 0.0, largest = -INFINITY;
+    double lo[4], hi[4], size = 0.0;
     for (int column = 0; column < 4; column++) {
         lo[column] = hi[column] = 0.0;
         for (int r = 0; r < 3; r++) {
@@ -284,12 +298,14 @@ static double support_under_entries(const pl_range_map *map, const pl_hull *belo
             size += fabs(d[r]) * (column == 3 ? 1.0 : reach) * fmax(fabs(entry.lo), fabs(entry.hi));
         }
     }
+    both_ways largest = {-INFINITY, -INFINITY};
     for (int corner = 0; corner < 8; corner++) {
         const double at[3] = {corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1], corner & 4 ? hi[2] : lo[2]};
         const bool again = (corner & 1 && lo[0] == hi[0]) || (corner & 2 && lo[1] == hi[1]) || (corner & 4 && lo[2] == hi[2]);
-        if (!again) largest = fmax(largest, support_along(below, at));
+        if (!again) largest = larger_ways(largest, both_along(below, at));
     }
-    return largest + hi[3] + 4.0 * ROUNDINGS * size;
+    const double slack = 4.0 * ROUNDINGS * size;
+    return (both_ways){largest.ahead + hi[3] + slack, largest.behind - lo[3] + slack};
 }
 
 static double with_slack(double support, double slack)
@@ -298,7 +314,6 @@ static double with_slack(double support, double slack)
     return isnan(sum) ? INFINITY : sum;
 }
 
-/* Two opposite directions at a time: they lie on the lattice alike. */
 void pl_hull_through_range(const pl_range_map *map, pl_hull *hull)
 {
     const pl_hull below = *hull;
@@ -309,23 +324,13 @@ void pl_hull_through_range(const pl_range_map *map, pl_hull *hull)
     for (int k = 0; known && k < c.count; k++) slack = fmax(slack, N * slack_under(&c.list[k], reach));
     if (known) slack += 16.0 * ROUNDINGS * N * c.largest * (1.0 + 3.0 * reach);
     for (int i = 0; i < PL_HULL_MIDDLE; i++) {
-        double d[3], sum = -INFINITY, opposite = -INFINITY;
+        double d[3];
         if (!direction_of(i, d)) continue;
-        const double back[3] = {-d[0], -d[1], -d[2]};
-        if (!known) {
-            sum = support_under_entries(map, &below, reach, d);
-            opposite = support_under_entries(map, &below, reach, back);
-        }
-        for (int k = 0; known && k < c.count; k++) {
-            double v[3];
-            const double move = turn_back(&c.list[k], d, v);
-            const cell at = cell_of(v);
-            const double ahead = support_at(&below, &at, 1) + move, behind = support_at(&below, &at, -1) - move;
-            sum = ahead > sum ? ahead : sum;
-            opposite = behind > opposite ? behind : opposite;
-        }
-        hull->support[i] = with_slack(sum, slack);
-        hull->support[PL_HULL_CELLS - 1 - i] = with_slack(opposite, slack);
+        both_ways mapped = {-INFINITY, -INFINITY};
+        if (!known) mapped = both_under_entries(map, &below, reach, d);
+        for (int k = 0; known && k < c.count; k++) mapped = larger_ways(mapped, both_under(&c.list[k], &below, d));
+        hull->support[i] = with_slack(mapped.ahead, slack);
+        hull->support[PL_HULL_CELLS - 1 - i] = with_slack(mapped.behind, slack);
     }
 }
 
