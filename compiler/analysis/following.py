@@ -127,9 +127,14 @@ class Following:
                     yield
             for change in afresh:
                 yield from self._exchange(change)
+        noted: dict[Facts, set[str]] = {}
         for found in self._names.refresh():
             if found is not None:
-                self._note_change(*found)
+                facts, name = found
+                noted.setdefault(facts, set()).add(name)
+            yield
+        for facts, names in noted.items():
+            self._note_change(facts, names)
             yield
 
     def _exchange(self, change: Change) -> Iterator[None]:
@@ -166,12 +171,12 @@ class Following:
         """Whether no other scene looks at the same files."""
         return all([len(each.scenes) == 1 for each in self.documents])
 
-    def _note_change(self, facts: Facts, name: str) -> None:
-        """``name``, which is in ``facts``, means something else now."""
+    def _note_change(self, facts: Facts, names: set[str]) -> None:
+        """``names``, which are in ``facts``, mean something else now."""
         block = facts.block
         if block in self._opened:
             return
-        places = [each.node.span for each in facts.names if each.node.name == name]
+        places = [each.node.span for each in facts.names if each.node.name in names]
         waiting = self._edited if block in self._edited else self._dirty
         if block not in waiting:
             waiting[block] = places if self._is_right_but_at(block, places) else None

@@ -8,12 +8,15 @@ Example: ``BlockResolver(Router(messages), namespace.entries, namespace.nearest)
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from operator import attrgetter
 from pathlib import Path
-from typing import Callable
+from typing import Callable, Sequence
 
 from ..reading import syntax
 from ..reading.diagnostics import Diagnostic, Diagnostics
 from ..reading.model import Calculate, Constant, Empty, Operand, Operator, Transform, Variants
+from ..reading.problems import Problem
 from ..reading.resolve import Resolver
 from ..reading.resolve_names import Entry
 from ..reading.source import Source, Span
@@ -28,6 +31,7 @@ Nearest = Callable[[str, tuple[str, ...] | None], str]
 _NOTHING = Variants(Constant(1.0))
 _OPERATORS: dict[str, Operator] = {"calculation": Calculate("", ()), "transformation": Transform("", ())}
 _NO_SOURCE = Source.from_text("")
+_START = attrgetter("span.start")
 
 
 class Router(Diagnostics):
@@ -46,6 +50,16 @@ class Router(Diagnostics):
         what = diagnostic.code, diagnostic.span.start, diagnostic.message
         if not any((each.code, each.span.start, each.message) == what for each in known):
             known.append(diagnostic)
+
+
+def _with_places(nodes: Sequence[syntax.Node], places: list[Span]) -> list[syntax.Node]:
+    """Those of ``nodes``, which stand in text order, that have one of the places in them. Of thousands, few do."""
+    found = set()
+    for place in places:
+        index = bisect_right(nodes, place.start, key=_START) - 1
+        if index >= 0 and place.end <= nodes[index].span.end:
+            found.add(index)
+    return [nodes[index] for index in sorted(found)]
 
 
 class BlockResolver(Resolver):
@@ -71,20 +85,22 @@ class BlockResolver(Resolver):
     def _leave_out(self) -> None:
         """Let terms and statements without any of the places be skipped."""
         terms, operators, is_right = self.terms, self.operators, self._is_right
-        term, statement = terms.term, operators._statement
+        union, statement = terms.union, operators._statement
 
-        def touched_term(node: syntax.Term, owner: str) -> Operand:
+        def touched_union(node: syntax.Union, owner: str) -> Operand:
             if (places := self._places) is None:
-                return term(node, owner)
-            if is_right(node):
-                return Empty(node.span)
+                return union(node, owner)
+            touched = _with_places(node.terms, places)
             self._places = None  # the first problem of a term hides others, so that all of it is looked at
-            try:
-                return term(node, owner)
-            finally:
-                self._places = places
+            for term in touched:
+                try:
+                    terms.term(term, owner)
+                except Problem as problem:
+                    problem.report(self.diagnostics)
+            self._places = places
+            return Empty(node.span)
 
-        terms.term = touched_term  # type: ignore[method-assign]
+        terms.union = touched_union  # type: ignore[method-assign]
         operators._statement = lambda node: _NOTHING if is_right(node) else statement(node)  # type: ignore[method-assign]
 
     def _is_right(self, node: syntax.Node) -> bool:
