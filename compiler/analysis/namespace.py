@@ -192,7 +192,7 @@ class Namespace:
             return self._signatures.pop(name, None) is not None
         definers = self.definers.get(name, {})
         several = len(definers) > 1 or any(len(each) > 1 for each in definers.values())
-        signature = (_signature(node, kind), id(node) if several else 0, name in self._unfinished)
+        signature = (_signature(node, kind), id(node) if several else 0)
         if self._signatures.get(name) == signature:
             return False
         self._signatures[name] = signature
