@@ -10,6 +10,7 @@ Example: the facts of ``Selection A { A -> C_step A; }`` are one definition (``A
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..reading import mistakes, syntax, vocabulary
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 
 # From this size on, a block's tree is made from the tree before the edit; below, a fresh parse is as quick.
 INCREMENTAL_BYTES = 8192
+
+
+_PLACE = attrgetter("node.span.start", "node.span.end")
 
 
 class Name(NamedTuple):
@@ -121,7 +125,7 @@ class Facts:
         found: list[Name] = []
         for node in self.file.definitions:
             _names_of(node, found)
-        places = {(span.start, span.end): name for name in found if name.node.name for span in (name.node.span,)}
+        places = {place: each for place, each in zip(map(_PLACE, found), found) if each.node.name}
         return [places[place] for place in sorted(places)]
 
     @lazy_property

@@ -2,8 +2,8 @@ r"""The table of habits from other languages; :mod:`habits` says how it is used.
 
 A pattern is matched against a line whose comments are blank and whose strings hold underscores only. What the message is
 about is the group ``at``, which ``\0`` in a text stands for; ``\1`` and on are groups. The first row that fits counts, so that
-special ones stand before general ones. A pattern that begins with a word says so (``\b``): tried at each letter of each
-word, it would cost the square of their lengths.
+special ones stand before general ones. A pattern that begins with a word says so (``\b``), and takes it whole
+(``\w++``): tried at each letter of each word, it would cost the square of their lengths.
 
 Example: ``Habit(_RULES, r"-{2,}>", "'-->' stands …", mend="->")`` is for ``A --> box;`` and writes ``->`` instead.
 """
@@ -59,7 +59,7 @@ _JUMPS = ("switch", "case", "for", "while", "do", "repeat", "foreach", "return")
 _OPERATIONS, _FUNCTIONS = tuple(vocabulary.OPERATIONS), tuple(vocabulary.FUNCTIONS)
 _KEYWORD = r"\b(?:Selection|Calculation|Transformation|Parameter|Texture)"
 _ARROW = r"(?:->|=>)"
-_SIGNED = r"\b[A-Za-z_]\w*(?:-[A-Za-z_]\w*)+\b"
+_SIGNED = r"\b[A-Za-z_]\w*+(?:-[A-Za-z_]\w*+)+\b"
 _HAS_SIGN = r"the name '\0' has a sign in it"
 
 _TOP, _HEAD, _RULES, _STATEMENTS, _PARAMETER, _BLOCKS = (
@@ -112,7 +112,7 @@ HABITS: tuple[Habit, ...] = (
          "write A -> 3: x | 1: y;", needs=("|",)),
     # operators and operands of rules
     _row(_RULES, rf"(?P<at>\b(?=[\w-]*\w\w){_SIGNED})", _HAS_SIGN, mend=_without_signs),
-    _row(_RULES, r"\b(\w+)(?:\([^()]*\))?\s*->(?:(?!\belse\b|\bif\b|->|;).)*?\b(?!\1\b)\w+\)?\s*(?P<at>->)\s*[\w(\[]", "a rule has one '->'", "'+' joins what it produces", "+"),
+    _row(_RULES, r"\b(\w++)(?:\([^()]*\))?\s*+->(?=[^;]*->)(?:(?!\belse\b|\bif\b|->|;).)*?\b(?!\1\b)\w+\)?\s*(?P<at>->)\s*[\w(\[]", "a rule has one '->'", "'+' joins what it produces", "+"),
     _row(_RULES, rf"(?P<at>\[\s*({_NUMBER}(?:\s+{_NUMBER}|\s*,\s*{_NUMBER}){{2}})\s*\])", "the name of an operation stands before its numbers", mend=r"[ trans \2 ]", needs=("[",)),
     _row(_RULES, rf"(?:{_ARROW}|[+(\]])\s*(?P<at>\[\s*{_NUMBER}(?:[\s,]+{_NUMBER})*\s*\])", "the name of an operation stands before its numbers", "write [ trans 0 0 1 ], or [ scale 0.5 ]", needs=("[",)),
     _row(_RULES, rf"{_ARROW}\s*(?P<at>(\w+\s*[-+*/]?=(?![=>])\s*{_NUMBER}))(?=\s*[A-Za-z_(\[])", "what changes a parameter stands in square brackets", mend=r"[ \2 ]", needs=("=",)),
@@ -126,10 +126,10 @@ HABITS: tuple[Habit, ...] = (
     _row(_RULES, rf"(?:^|[{{;])\s*(?P<at>{_ARROW})", r"the name of a Selection stands before '\0'", "a rule looks like Name -> operators operand + …;", code="missing"),
     _row(_RULES, rf"(?P<at>({_PRIMITIVE})\s+({_NUMBER}|\"_*\"))", "arguments stand in brackets", mend=r"\2(\3)"),
     _row(_RULES, r"(?P<at>\bmesh\s*\(\s*([\w./-]+\.\w+)\s*\))", "a file's name stands in quotation marks", mend=r'mesh("\2")', needs=("mesh",)),
-    _row(_RULES, rf"(?P<at>\b(?!{_OPERATION})([A-Za-z_]\w*)\s+({_NUMBER}(?:[\s,]+{_NUMBER})*))\s*(?=[;|+)]|$)", "arguments stand in brackets",
+    _row(_RULES, rf"(?P<at>\b(?!{_OPERATION})([A-Za-z_]\w*+)\s++({_NUMBER}(?:[\s,]+{_NUMBER})*))\s*(?=[;|+)]|$)", "arguments stand in brackets",
          mend=lambda text: _with_commas(re.sub(r"\s+", "(", text, count=1) + ")")),
     _row(_RULES, rf"(?P<at>\b(\w+)\s*[\[<]\s*({_VALUE}(?:\s*,\s*{_VALUE})+|{_NUMBER})\s*[\]>])", "arguments stand in round brackets", mend=r"\2(\3)", needs=("[", "<")),
-    _row(_RULES, r"(?P<at>(?!if\b)\b(\w+)\s+\(([^();]*[\d,*/%-][^();]*)\))", "a space stands between a symbol and its arguments", mend=r"\2(\3)"),
+    _row(_RULES, r"(?P<at>(?!if\b)\b(\w++)\s++\(([^();]*[\d,*/%-][^();]*)\))", "a space stands between a symbol and its arguments", mend=r"\2(\3)"),
     _row(_RULES, rf"{_ARROW}\s*(?P<at>\+)", "nothing stands before this '+'", "remove it: '+' joins two operands", "", needs=("+",)),
     _row(_RULES, rf"{_ARROW}(?:\s*\b\w+)*?\s*(?P<at>(\d[\w.]*)\s*\*)\s*\w", "a number doesn't multiply an operand",
          r"write [ scale \2 ] for another size; a Selection repeats: Row -> box + [ --n; trans 1 0 0 ] Row", needs=("*",)),
@@ -139,8 +139,8 @@ HABITS: tuple[Habit, ...] = (
     # how rules choose
     _row(_RULES, r"\)\s*(?P<at>then\b)\s*", "no 'then' stands between a condition and its rule", mend="", needs=("then",)),
     _row(_RULES, rf"\bif\s+(?P<at>(?!\()({_INNER}\)))\s*\w+\s*{_ARROW}", "this condition lacks its '('", mend=r"(\2", needs=("if",)),
-    _row(_RULES, rf"(?P<at>\b(\w+)\s*{_ARROW}\s*(if\s*\({_INNER}\)))[^;]*;?", "a condition stands before its rule", mend=r"\3 \2 ->", needs=("if",)),
-    _row(_RULES, rf"(?P<at>\b(\w+)\s*{_ARROW}\s*\(({_INNER}(?:[<>]|[=!]=){_INNER})\))", "a condition stands before its rule", mend=r"if (\3) \2 ->"),
+    _row(_RULES, rf"(?P<at>\b(\w++)\s*+{_ARROW}\s*(if\s*\({_INNER}\)))[^;]*;?", "a condition stands before its rule", mend=r"\3 \2 ->", needs=("if",)),
+    _row(_RULES, rf"(?P<at>\b(\w++)\s*+{_ARROW}\s*\(({_INNER}(?:[<>]|[=!]=){_INNER})\))", "a condition stands before its rule", mend=r"if (\3) \2 ->"),
     _row(_RULES, rf"(?P<at>\b(\w+)\s*{_ARROW}\s*([^;?\[\]]*?)\s*\?\s*([^;:?]*?)\s*:\s*([^;:?]*?)\s*;)", "a rule chooses by `if`",
          mend=r"if (\3) \2 -> \4; else \2 -> \5;", needs=("?",)),
     # conditions and expressions
@@ -157,7 +157,7 @@ HABITS: tuple[Habit, ...] = (
     _row(_PL, rf"(?P<at>({_FUNCTION})\s+(-?[\w.]+))\s*[;)\],+*/-]", "a function's arguments stand in brackets", mend=r"\2(\3)", needs=_FUNCTIONS),
     _row(_PL, rf"(?P<at>({_FUNCTION})[\[{{]([^][{{}}]*)[\]}}])", "a function's arguments stand in round brackets", mend=r"\2(\3)", needs=("[", "{")),
     _row(_PL, r"(?P<at>\b(?:[Mm]ath|std|np|numpy)(?:\.|::))\w+", r"plsys has no '\0' before its functions", mend="", needs=("ath", "std", "np", "numpy")),
-    _row(_PL, rf"(?P<at>\w+\(\s*{_NUMBER}(?:\s+{_NUMBER})+\s*\))", "a comma stands between two arguments", mend=_with_commas, needs=("(",)),
+    _row(_PL, rf"(?P<at>\b\w++\(\s*{_NUMBER}(?:\s+{_NUMBER})+\s*\))", "a comma stands between two arguments", mend=_with_commas, needs=("(",)),
     _row(_PL + _BLOCKS, r"(?P<at>,)\s*[)>]", "nothing stands after this ','", "remove it", "", needs=(",",)),
     _row(_PL + _BLOCKS, r"(?:[(<]|[(<][^<>();{}]*,)\s*(?P<at>,)", "nothing stands before this ','", "remove it", "", needs=(",",)),
     # statements

@@ -125,12 +125,16 @@ def _directive_query() -> Query:
     return Query(language(), "(directive) @directive")
 
 
-def extras(reading: Reading, tree: Tree) -> None:
-    """Report what may stand anywhere: a comment that the end of the file cuts off, and unknown directives."""
+def _directives(tree: Tree) -> list[Node]:
     from tree_sitter import QueryCursor
 
-    found = QueryCursor(_directive_query()).captures(tree.root_node) if b"#" in reading.data else {}
-    directives = sorted(found.get("directive", []), key=lambda node: node.start_byte)
+    found = QueryCursor(_directive_query()).captures(tree.root_node)
+    return sorted(found.get("directive", []), key=lambda node: node.start_byte)
+
+
+def extras(reading: Reading, tree: Tree) -> None:
+    """Report what may stand anywhere: a comment that the end of the file cuts off, and unknown directives."""
+    directives = _directives(tree) if b"#" in reading.data else []
     if directives:
         # What follows a directive in its line may be its arguments.
         rows = {reading.span(node).start_position.line: node.end_byte for node in reversed(directives)}

@@ -76,14 +76,13 @@ def _shorter(name: str) -> set[str]:
 def _a_letter_off(name: str, names: Iterable[str], shorter: set[str]) -> str | None:
     """The one of ``names`` that has a letter more than ``name``, or else one that lacks a letter: by difflib's ratio no
     other is more like a ``name`` of three letters or more, so that the others needn't be compared."""
-    size, slips = len(name), []
+    size, slips, folded = len(name), [], name.casefold()
     for other in names:
-        if other in shorter:
-            slips.append(other)
-        elif len(other) == size:
-            if other.casefold() == name.casefold():
+        more = len(other) - size
+        if more == 0:
+            if other.casefold() == folded:
                 return None
-        elif len(other) == size + 1 and _has_one_more(name, other):
+        elif (more == -1 and other in shorter) or (more == 1 and _has_one_more(name, other)):
             slips.append(other)
     return max(slips, key=lambda other: (len(other), other), default=None) if size > 2 else None
 

@@ -7,6 +7,7 @@ typed, about the finished blocks before it only what is true.
 from __future__ import annotations
 
 import random
+import re
 from pathlib import Path
 
 import pytest
@@ -108,6 +109,37 @@ def test_random_edits_end_where_a_fresh_analysis_does():
             if rng.random() < 0.5:  # undo, so that the text stays a scene
                 project.edit(document, start, start + len(piece), data[start:end])
                 compare(project, document, path)
+
+
+PLANT = """\
+Selection Tree{i} {{ C_init{i} Tree{i}; if (n{i} > 0) Tree{i} -> T_up{i} box + C_less{i} (T_up{i} Tree{i} + cylinder); else Tree{i} -> box; }}
+Calculation C_init{i} {{ n{i} = 3; }}
+Calculation C_less{i} {{ --n{i}; }}
+Transformation T_up{i} {{ trans 0 0 {i}; scale 0.5 0.5 0.5; }}
+"""
+
+
+def test_a_key_at_many_cursors_ends_where_a_fresh_analysis_does():
+    """One key at many places at once, in names mostly, and all of it taken back; one block uses the names of all others."""
+    rng, path = random.Random(11), Path("scene.plsys")
+    terms = (f"(T_up{i} Tree{i} + T_up{i} [ trans n{i} 0 0 ] Tree{i})" if i % 3 else f"T_up{i} Tree{i}" for i in range(12))
+    forest = f"Selection Forest {{ Forest -> {' + '.join(terms)}; }}\nobject {{ Forest }}\n"
+    whole = ("".join(PLANT.format(i=i) for i in range(12)) + forest).encode()
+    in_names = [match.start() for match in re.finditer(rb"(?<=[A-Za-z_])\d+", whole)]
+    for _ in range(rounds(ci=30, stress=2000)):
+        project = Project()
+        document = project.open(path, whole)
+        for _ in range(2):
+            anywhere = rng.sample(range(1, len(whole)), rng.choice((0, 0, 0, 1, 5)))
+            typed = set(rng.sample(in_names, rng.randrange(1, 30)) + anywhere)
+            project.edits(document, [(place, place, b"x") for place in sorted(typed, reverse=True)])
+            compare(project, document, path)
+            first = set(rng.sample(sorted(typed), rng.randrange(len(typed))))
+            for gone, there in (first, typed), (typed - first, typed - first):
+                at = [place + sum(other < place for other in there) for place in gone]
+                project.edits(document, [(place, place + 1, b"") for place in sorted(at, reverse=True)])
+                compare(project, document, path)
+            assert document.text.data == whole
 
 
 def compare(project: Project, document: Document, path: Path) -> None:
