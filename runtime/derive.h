@@ -108,6 +108,12 @@ size_t pl_scope_words(const pl_program *program, const pl_scope *scope);
 void pl_scope_pack(const pl_program *program, const pl_scope *scope, uint64_t *words);
 void pl_scope_unpack(const pl_program *program, const uint64_t *words, pl_scope *scope);
 
+/* Replaces a packed scope's random key. */
+static inline void pl_scope_set_key(uint64_t *words, uint64_t key)
+{
+    words[0] = key;
+}
+
 bool pl_path_push(pl_path *path, uint32_t length, uint32_t term); /* sets path->terms[length]; false: no memory */
 bool pl_path_copy(pl_path *path, const pl_path *from, uint32_t length);
 /* -1, 0 or 1: the order of two leaves in the derivation is the lexicographic order of their terms. */

@@ -30,6 +30,7 @@ static void work_destroy(void *memory)
     free(w->frames);
     free(w->inside);
     free(w->stack);
+    free(w->scope);
     free(w->scopes);
     free(w->slots);
     free(w->free_slots);
@@ -53,10 +54,11 @@ static void *work_create(const pl_scene *scene, pl_error *error)
     work *w = calloc(1, sizeof *w);
     if (w && (w->unfolder = pl_unfolder_create(scene, error))) {
         w->scope_words = pl_scope_words(scene->program, &(pl_scope){.draws = 0});
+        w->scope = malloc(w->scope_words * sizeof *w->scope);
         w->kernel = kernel_of(scene);
-        return w;
+        if (w->scope) return w;
     }
-    free(w);
+    work_destroy(w);
     pl_fail_memory(error, "preparing to trace");
     return NULL;
 }
@@ -80,6 +82,14 @@ static inline void insert(work *w, size_t first)
     w->stack[place] = next;
 }
 
+/* Whether an item stands below a drawn transformation that is singular. */
+static bool is_dropped(const pl_lazy_state *state, const pl_lazy_item *it)
+{
+    for (uint32_t i = 0; i < it->link_count; i++)
+        if (pl_lazy_transform(state, &it->links[i])->singular) return true;
+    return false;
+}
+
 /* Goes with a frame's rays as far as an item of its state; those that miss it are left out. */
 static void approach(const work *w, const frame *f, const pl_lazy_item *it, bool gates, pending *next, pl_counters *counters)
 {
@@ -91,16 +101,15 @@ static void approach(const work *w, const frame *f, const pl_lazy_item *it, bool
     const bool gated = gates && it->kind == PL_NODE_ENTER;
     if (it->boxed) {
         counters->box_tests += (unsigned)__builtin_popcount(next->rays);
-        next->rays = w->kernel->clip(it, &f->state->reach, f->stretch, &w->wants, from, to, next->rays, &next->t_entry);
+        next->rays = w->kernel->clip(it, &f->state->pattern->reach, f->stretch, &w->wants, from, to, next->rays, &next->t_entry);
     } else if (!gated || it->gate->unbounded) {
         next->t_entry = w->kernel->begin(&w->wants, to, next->rays);
     }
     if (next->rays && gated) {
-        const double *stretches = pl_lazy_stretches(it);
-        for (uint32_t i = 0; i < it->transform_count; i++) next->stretch *= stretches[i];
+        for (uint32_t i = 0; i < it->link_count; i++) next->stretch *= pl_lazy_stretch(f->state, &it->links[i]);
         counters->box_tests += (unsigned)__builtin_popcount(next->rays);
         next->arrived = true;
-        w->kernel->map(it, from, to, next->rays);
+        w->kernel->map(f->state, it, from, to, next->rays);
         next->rays = w->kernel->meet(it->gate, next->stretch, &w->wants, from, to, next->rays, &next->open, &next->t_entry);
     }
 }
@@ -109,11 +118,12 @@ static void approach(const work *w, const frame *f, const pl_lazy_item *it, bool
 static bool push_items(work *w, uint32_t index, bool gates, pl_counters *counters, pl_error *error)
 {
     const frame *f = &w->frames[index];
+    const pl_lazy_state *state = f->state;
     const size_t first = w->stack_count;
-    for (uint32_t i = 0; i < f->state->item_count; i++) {
-        const pl_lazy_item *it = &f->state->items[i];
+    for (uint32_t i = 0; i < state->pattern->item_count; i++) {
+        const pl_lazy_item *it = &state->pattern->items[i];
         uint32_t slot;
-        if (w->queries->shadow && it->no_shadow) continue;
+        if ((w->queries->shadow && it->no_shadow) || (state->singular && is_dropped(state, it))) continue;
         if (!take_slot(w, &slot, error) || !grow(&w->stack, w->stack_count, &w->stack_capacity, sizeof *w->stack, error)) return false;
         pending *next = &w->stack[w->stack_count];
         next->frame = index;
@@ -126,7 +136,7 @@ static bool push_items(work *w, uint32_t index, bool gates, pl_counters *counter
             continue;
         }
         insert(w, first);
-        fetch(atomic_load_explicit(&it->state, memory_order_relaxed));
+        fetch(atomic_load_explicit(&state->below[i], memory_order_relaxed));
     }
     return true;
 }
@@ -147,20 +157,21 @@ static pl_span span_of(work *w, size_t index, uint32_t ray)
         frame *f = &w->frames[i];
         double o[3], d[3];
         take_ray(w, f->slot, ray, o, d);
-        *inside_of(w, i, ray) = pl_span_below(w->frames[i - 1].state->items[f->item].gate, o, d, *inside_of(w, i - 1, ray));
+        *inside_of(w, i, ray) = pl_span_below(w->frames[i - 1].state->pattern->items[f->item].gate, o, d, *inside_of(w, i - 1, ray));
         f->spanned |= bit;
     }
     return *inside_of(w, index, ray);
 }
 
 /* Keeps the scopes of frames that have states, by which they are found again: all are equally long, having no draws. */
-static bool keep_scopes(work *w, pl_error *error)
+static bool keep_scopes(work *w, const pl_program *program, pl_error *error)
 {
     const size_t words = w->scope_words;
     for (size_t i = 1; i < w->frame_count; i++) {
-        if (!w->frames[i - 1].state) continue;
+        const pl_lazy_state *above = w->frames[i - 1].state;
+        if (!above) continue;
         if (!grow(&w->scopes, (i + 1) * words, &w->scope_capacity, sizeof *w->scopes, error)) return false;
-        memcpy(w->scopes + i * words, w->frames[i - 1].state->items[w->frames[i].item].scope, words * sizeof *w->scopes);
+        pl_lazy_scope(program, above, &above->pattern->items[w->frames[i].item], words, w->scopes + i * words);
     }
     return true;
 }
@@ -171,7 +182,7 @@ static bool change(pl_tracer *tracer, pl_error *error)
     work *w = tracer->work;
     for (size_t i = 0; tracer->scene->gates && i < w->frame_count; i++)
         for (uint32_t rays = w->frames[i].rays; rays;) span_of(w, i, next_ray(&rays));
-    if (!keep_scopes(w, error)) return false;
+    if (!keep_scopes(w, tracer->scene->program, error)) return false;
     for (size_t i = 0; i < w->frame_count; i++) w->frames[i].state = NULL;
     w->half = pl_lazy_change(tracer->scene->structure, w->half);
     w->changes++;
@@ -183,11 +194,11 @@ static pl_lazy_state *state_of(pl_tracer *tracer, size_t index, pl_error *error)
 {
     work *w = tracer->work;
     while (!w->frames[index].state) {
-        const frame *above = index ? &w->frames[index - 1] : NULL, *f = &w->frames[index];
-        const uint64_t *scope = !above         ? NULL
-                                : above->state ? above->state->items[f->item].scope
-                                               : w->scopes + index * w->scope_words;
+        const pl_lazy_state *above = index ? w->frames[index - 1].state : NULL;
+        const frame *f = &w->frames[index];
+        const uint64_t *scope = !index ? NULL : above ? w->scope : w->scopes + index * w->scope_words;
         bool full;
+        if (above) pl_lazy_scope(tracer->scene->program, above, &above->pattern->items[f->item], w->scope_words, w->scope);
         pl_lazy_state *state = pl_lazy_get(tracer->scene->structure, w->half, w->unfolder, f->symbol, scope, &w->spent, &full, error);
         if (!state && (!full || !change(tracer, error))) return NULL;
         w->frames[index].state = state;
@@ -197,23 +208,24 @@ static pl_lazy_state *state_of(pl_tracer *tracer, size_t index, pl_error *error)
 
 /* Goes into an instance, that of a frame that is complete but for its state: by an item of the frame before, or the scene itself
  * (NULL). */
-static bool enter(pl_tracer *tracer, pl_lazy_item *it, pl_error *error)
+static bool enter(pl_tracer *tracer, const pl_lazy_item *it, pl_error *error)
 {
     work *w = tracer->work;
     const uint32_t index = (uint32_t)w->frame_count;
     frame *f = &w->frames[index];
+    _Atomic(pl_lazy_state *) *place = it ? &w->frames[index - 1].state->below[f->item] : NULL;
     f->symbol = it ? it->what : UINT32_MAX;
     if (index > PL_LIMIT_DEPTH / w->part)
         return pl_fail_at(error, PL_ERROR_LIMIT, tracer->scene->program, f->symbol,
                           "depth: a ray came %d symbols deep, which is the limit; does the recursion end?", PL_LIMIT_DEPTH);
-    f->state = it ? atomic_load_explicit(&it->state, memory_order_acquire) : NULL;
+    f->state = it ? atomic_load_explicit(place, memory_order_acquire) : NULL;
     w->found += f->state != NULL;
     w->frame_count++;
     if (!f->state) {
         const uint32_t changes = w->changes;
         pl_lazy_state *state = state_of(tracer, index, error);
         if (!state) return false;
-        if (it && w->changes == changes) atomic_store_explicit(&it->state, state, memory_order_release);
+        if (it && w->changes == changes) atomic_store_explicit(place, state, memory_order_release);
     }
     if (w->spent > MOST_WORK / w->part)
         return fail_work(tracer->scene, f->symbol, "needed to visit more nodes of the graph than", MOST_WORK, error);
@@ -251,18 +263,19 @@ static pl_gate decide(pl_tracer *tracer, const pl_lazy_item *it, frame *f, uint3
     if (gate != PL_GATE_CUT || !(t_entry < query->t_max)) return gate;
     pl_leaf leaf = {.path = write_path, .source = w};
     const uint64_t hash = pl_cut_hash(0, w->path.terms, w->path.length);
-    const double coverage = pl_lazy_coverage(w->unfolder, it->what, it->scope, d);
+    pl_lazy_scope(tracer->scene->program, w->frames[w->frame_count - 1].state, it, w->scope_words, w->scope);
+    const double coverage = pl_lazy_coverage(w->unfolder, it->what, w->scope, d);
     *ok = pl_query_cut_box(query, it->gate, coverage, &at, hash, t_entry, &leaf);
     update(w, ray);
     return gate;
 }
 
 /* Goes into the instance of an item, which f is, with the rays for which its gate is open. */
-static bool visit_instance(pl_tracer *tracer, pl_lazy_item *it, frame *f, const pending *at, pl_error *error)
+static bool visit_instance(pl_tracer *tracer, const pl_lazy_item *it, frame *f, const pending *at, pl_error *error)
 {
     work *w = tracer->work;
     bool ok = true;
-    if (!at->arrived) w->kernel->map(it, rays_at(w, w->frames[at->frame].slot), rays_at(w, f->slot), f->rays);
+    if (!at->arrived) w->kernel->map(w->frames[at->frame].state, it, rays_at(w, w->frames[at->frame].slot), rays_at(w, f->slot), f->rays);
     for (uint32_t rays = at->arrived ? f->rays & ~at->open : 0; ok && rays;) {
         const uint32_t ray = next_ray(&rays);
         if (decide(tracer, it, f, ray, &ok) != PL_GATE_OPEN) f->rays &= ~(UINT32_C(1) << ray);
@@ -277,7 +290,7 @@ static bool visit_instance(pl_tracer *tracer, pl_lazy_item *it, frame *f, const 
 }
 
 /* Offers a primitive or a mesh to rays, in the frame of the state that it belongs to. */
-static bool visit_leaf(pl_tracer *tracer, const pl_lazy_item *it, uint32_t slot, uint32_t rays)
+static bool visit_leaf(pl_tracer *tracer, const pl_lazy_state *state, const pl_lazy_item *it, uint32_t slot, uint32_t rays)
 {
     work *w = tracer->work;
     double o[3], d[3];
@@ -287,7 +300,7 @@ static bool visit_leaf(pl_tracer *tracer, const pl_lazy_item *it, uint32_t slot,
     while (rays) {
         const uint32_t ray = next_ray(&rays);
         take_ray(w, slot, ray, o, d);
-        for (uint32_t i = 0; i < it->transform_count; i++) pl_map_ray(it->transforms[i], o, d);
+        for (uint32_t i = 0; i < it->link_count; i++) pl_map_ray(pl_lazy_transform(state, &it->links[i]), o, d);
         tracer->counters.primitive_tests++;
         if (!pl_query_leaf(&w->queries[ray], &leaf)) return false;
         update(w, ray);
@@ -299,15 +312,15 @@ static bool visit_leaf(pl_tracer *tracer, const pl_lazy_item *it, uint32_t slot,
 static bool visit(pl_tracer *tracer, const pending *at, pl_error *error)
 {
     work *w = tracer->work;
-    pl_lazy_state *state = state_of(tracer, at->frame, error);
+    const pl_lazy_state *state = state_of(tracer, at->frame, error);
     if (!state || !grow(&w->frames, w->frame_count, &w->frame_capacity, sizeof *w->frames, error) ||
         !grow(&w->inside, (w->frame_count + 1) * 4 * w->fours, &w->inside_capacity, sizeof *w->inside, error))
         return false;
-    pl_lazy_item *it = &state->items[at->item];
+    const pl_lazy_item *it = &state->pattern->items[at->item];
     if (!extend_path(w, it, error)) return false;
     if (it->kind != PL_NODE_ENTER) {
         give_slot(w, at->slot);
-        return visit_leaf(tracer, it, w->frames[at->frame].slot, at->rays);
+        return visit_leaf(tracer, state, it, w->frames[at->frame].slot, at->rays);
     }
     frame *f = &w->frames[w->frame_count];
     *f = (frame){.terms = w->path.length, .item = at->item, .slot = at->slot, .rays = at->rays, .stretch = at->stretch};

@@ -21,6 +21,7 @@ struct pl_lazy_half {
     chunk *chunks, *spare; /* the newest first; emptied ones */
     size_t bytes;
     uint64_t states;
+    uint64_t epoch; /* since it was emptied last; never that of another half */
     unsigned users; /* rays that stand in it */
 };
 
@@ -32,7 +33,7 @@ struct pl_lazy_cache {
     pl_lazy_half halves[2], *current;
     uint32_t bucket_count;
     size_t limit, chunk_size; /* of a half */
-    uint64_t unfolded, evicted;
+    uint64_t unfolded, evicted, epochs;
     bool keys_repeat;
     atomic_uint_fast64_t found;
 };
@@ -88,6 +89,7 @@ pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_erro
     for (int i = 0; i < 2; i++) {
         cache->halves[i].buckets = calloc(cache->bucket_count, sizeof(pl_lazy_state *));
         cache->halves[i].bytes = cache->bucket_count * sizeof(pl_lazy_state *);
+        cache->halves[i].epoch = ++cache->epochs;
         ok = ok && cache->halves[i].buckets;
     }
     if (ok) return cache;
@@ -163,6 +165,7 @@ static void empty(pl_lazy_cache *cache, pl_lazy_half *half)
     }
     memset(half->buckets, 0, cache->bucket_count * sizeof *half->buckets);
     half->states = 0;
+    half->epoch = ++cache->epochs;
 }
 
 /* A ray that waits stands in neither half, and one that doesn't ends or comes here, so no two wait for each other. */
@@ -218,8 +221,8 @@ static pl_lazy_state **bucket_of(const pl_lazy_cache *cache, const pl_lazy_half 
 static pl_lazy_state *find(pl_lazy_state *bucket, uint64_t hash, uint32_t symbol, const uint64_t *key, uint32_t words)
 {
     for (pl_lazy_state *state = bucket; state; state = state->next)
-        if (state->hash == hash && state->symbol == symbol && state->key_words == words &&
-            memcmp(state->key, key, words * sizeof *key) == 0)
+        if (state->hash == hash && state->key == key[0] && state->pattern->symbol == symbol &&
+            memcmp(state->pattern->live, key + 1, (words - 1) * sizeof *key) == 0)
             return state;
     return NULL;
 }
@@ -243,12 +246,12 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder
         pl_fail_memory(error, "unfolding a state");
         return NULL;
     }
-    uint64_t hash = symbol;
-    for (uint32_t i = 0; i < words; i++) hash = pl_mix(hash, key[i]);
-    pl_lazy_state **bucket = bucket_of(cache, half, hash);
     const bool once = is_met_once(cache, symbol);
-    pl_lazy_state *state = NULL;
+    pl_lazy_state *state = NULL, **bucket = NULL;
+    uint64_t hash = symbol;
     if (!once) {
+        for (uint32_t i = 0; i < words; i++) hash = pl_mix(hash, key[i]);
+        bucket = bucket_of(cache, half, hash);
         pthread_mutex_lock(&cache->lock);
         state = find(*bucket, hash, symbol, key, words);
         pthread_mutex_unlock(&cache->lock);
@@ -257,7 +260,7 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder
         pl_lazy_add_found(cache, 1);
         return state;
     }
-    if (!pl_unfolder_derive(unfolder, symbol, cache->classes, &bytes, work, error)) return NULL;
+    if (!pl_unfolder_prepare(unfolder, symbol, cache->classes, half->epoch, &bytes, work, error)) return NULL;
     pthread_mutex_lock(&cache->lock);
     void *memory = allocate(cache, half, bytes, full);
     cache->unfolded += memory != NULL;
@@ -266,8 +269,9 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder
         if (!*full) pl_fail_memory(error, "unfolding a state");
         return NULL;
     }
-    state = pl_unfolder_write(unfolder, symbol, hash, memory);
-    if (once) return state;
+    state = pl_unfolder_write(unfolder, symbol, memory, error);
+    if (once || !state) return state;
+    state->hash = hash;
     pthread_mutex_lock(&cache->lock);
     state->next = *bucket;
     *bucket = state;

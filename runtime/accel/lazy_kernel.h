@@ -106,7 +106,7 @@ static uint32_t lazy_clip(const pl_lazy_item *it, const pl_reach *reach, double 
     return met;
 }
 
-static void lazy_map(const pl_lazy_item *it, const pl_lazy_four *from, pl_lazy_four *to, uint32_t rays)
+static void lazy_map(const pl_lazy_state *state, const pl_lazy_item *it, const pl_lazy_four *from, pl_lazy_four *to, uint32_t rays)
 {
     EACH_FOUR(four, rays)
     {
@@ -115,8 +115,8 @@ static void lazy_map(const pl_lazy_item *it, const pl_lazy_four *from, pl_lazy_f
             o[axis] = get4(from[four].o[axis]);
             d[axis] = get4(from[four].d[axis]);
         }
-        for (uint32_t i = 0; i < it->transform_count; i++) {
-            const pl_transform *transform = it->transforms[i];
+        for (uint32_t i = 0; i < it->link_count; i++) {
+            const pl_transform *transform = pl_lazy_transform(state, &it->links[i]);
             pl_affine room;
             const double *m = pl_transform_entries(transform, room.m);
             if (transform->form <= PL_FORM_PACKED) {

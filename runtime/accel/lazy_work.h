@@ -47,7 +47,7 @@ typedef struct work {
     frame *frames;
     pl_span *inside; /* with cut-offs: of what stands below a frame, for each ray of the fours */
     pending *stack;
-    uint64_t *scopes;
+    uint64_t *scope, *scopes; /* packed: of what is to be unfolded; of frames whose states were let go */
     pl_lazy_four *slots; /* `fours` each … */
     uint32_t *free_slots; /* … of which these aren't used */
     pl_path path; /* to the last frame */

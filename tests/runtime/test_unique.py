@@ -91,6 +91,45 @@ def test_cut_offs_are_the_same_in_every_accelerator_and_budget(px):
         assert ("accelerator" in options) != (counts["lazy"]["unfolded"] > 0)
 
 
+# What states of a symbol with the same parameters have in common, and what draws may change of it.
+SWAYING = FOREST[: FOREST.index("Selection Tree {")].replace("] Tree;", "] Tree(%d, 30);") + """
+Selection Tree(n, bend) {
+    if (n > 0) Tree -> %s;
+    else       Tree -> %s;
+}
+Transformation T_scale { scale 0.08 0.08 1; }
+Transformation T_a { trans 0 0 0.98; roty bend; scale 0.75; }
+Transformation T_b { trans 0 0 0.98; roty -bend; rotz 90; scale 0.7; }
+Transformation T_sway { rotz 50*rand(0) - 25; roty 12*rand(1) - 6; }
+Transformation T_maybe { scale floor(0.7 + rand(0)); }
+"""
+BELOW = "Tree(n - 1, bend - 1)"
+APPLICATIONS = {
+    "maps": (f"T_scale cylinder + T_a T_sway {BELOW} + T_b T_sway {BELOW}", "T_scale cylinder"),
+    "maps of unions": (f"T_scale cylinder + [ rotz 9*rand(0) ] (T_a {BELOW} + T_b {BELOW})", "T_scale cylinder"),
+    "several maps": (f"T_scale cylinder + T_sway (T_a T_sway {BELOW} + T_b T_sway T_sway {BELOW})", "T_scale cylinder"),
+    "maps of leaves": (f"T_scale cylinder + T_a T_sway {BELOW} + T_b {BELOW}", "T_sway T_scale cylinder"),
+    "what is there": (f"T_scale cylinder + T_a T_maybe {BELOW} + T_b T_maybe T_sway {BELOW}", "T_scale cylinder"),
+    "choices": (f"1: T_scale cylinder + T_a T_sway {BELOW} + T_b {BELOW} | 2: T_b T_sway {BELOW}", "T_scale cylinder"),
+    "parameters": (f"T_scale cylinder + [ bend = bend + rand(0) ] T_a T_sway {BELOW} + T_b T_sway {BELOW}", "T_scale cylinder"),
+    "sizes": (f"T_scale cylinder + T_a T_sway {BELOW} + T_b T_sway {BELOW}", "[ scale 0.1 ] cone(0.5*rand(0))"),
+    "variants": (f"T_scale cylinder + [ variants 50; ] T_a T_sway {BELOW} + T_b T_sway {BELOW}", "T_scale cylinder"),
+}
+
+
+@pytest.mark.parametrize("drawn", APPLICATIONS)
+def test_states_that_differ_by_draws_are_the_same_in_every_accelerator_and_budget(drawn):
+    fork, tip = APPLICATIONS[drawn]
+    # Nothing has bounds that may be singular, so all of it is met by each ray.
+    level, order, px, memory = (1, 4, 0.0, 200_000) if "T_maybe" in fork else (4, 7, 2.0, 24_000_000)
+    data = build(Source("forest.plsys", (SWAYING % (level, order, fork, tip)).encode())).encode()
+    expected, _ = picture(data, accelerator="none", detail=px, threads=2)
+    found, counts = picture(data, memory=memory, detail=px, threads=2)
+    assert counts["lazy"]["unfolded"] > 0
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values, err_msg=name)
+
+
 # From above a tree is a thin upright pole; in its own frame that leans, so what is known of a tree reaches to where its twig
 # would be, 3.4 from the pole. There, beyond a second pole, is room in what is known of the place.
 EMPTY_TWIGS = FOREST[: FOREST.index("Selection Tree {")].replace("rotz 360*rand(3);", "roty -20; rotx -5;").replace(
