@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 # From this size on, a block's tree is made from the tree before the edit; below, a fresh parse is as quick.
 INCREMENTAL_BYTES = 8192
 
-
 _PLACE = attrgetter("node.span.start", "node.span.end")
 
 
