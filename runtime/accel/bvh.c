@@ -201,22 +201,29 @@ static bool is_alike(const pl_ray *first, const pl_ray *other, double scale)
     }
     return true;
 }
+
+/* Whether rays may be a packet, by the first two and the last one: the packets' kernel looks at all. */
+static bool are_like_packet(const pl_ray *rays, unsigned count, double scale)
+{
+    return count >= PL_LEAST_LANES && is_alike(rays, rays + 1, scale) && is_alike(rays, rays + count - 1, scale);
+}
 #endif
 
 /* Where not all go together, halves of them may. */
 static bool trace_many(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count)
 {
-    pl_bvh_many_kernel *kernel = pl_bvh_stream_scalar;
-    bool packet = false;
 #ifdef __x86_64__
     const int isa = tracer->scene->isa;
     const double scale = ((const pl_fronts *)tracer->scene->structure)->list->scale;
-    /* The packets' kernel looks at all. */
-    packet = isa != PL_ISA_SCALAR && count >= PL_LEAST_LANES && is_alike(rays, rays + 1, scale) && is_alike(rays, rays + count - 1, scale);
-    if (isa != PL_ISA_SCALAR) kernel = packet ? pl_bvh_packet_avx2 : isa == PL_ISA_AVX512 ? pl_bvh_stream_avx512 : pl_bvh_stream_avx2;
+    const unsigned half = PL_LANES / 2;
+    if (isa == PL_ISA_SCALAR) return pl_bvh_stream_scalar(tracer, rays, queries, count);
+    if (are_like_packet(rays, count, scale)) return pl_bvh_packet_avx2(tracer, rays, queries, count);
+    if (count > half && (are_like_packet(rays, half, scale) || are_like_packet(rays + half, count - half, scale)))
+        return trace_many(tracer, rays, queries, half) && trace_many(tracer, rays + half, queries + half, count - half);
+    return (isa == PL_ISA_AVX512 ? pl_bvh_stream_avx512 : pl_bvh_stream_avx2)(tracer, rays, queries, count);
+#else
+    return pl_bvh_stream_scalar(tracer, rays, queries, count);
 #endif
-    if (packet || count <= PL_STREAM) return kernel(tracer, rays, queries, count);
-    return trace_many(tracer, rays, queries, PL_STREAM) && trace_many(tracer, rays + PL_STREAM, queries + PL_STREAM, count - PL_STREAM);
 }
 
 static bool misses(const pl_scene *scene, const double eye[3], const double (*directions)[3])

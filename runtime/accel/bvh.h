@@ -26,7 +26,7 @@ typedef struct pl_frame {
 
 enum {
     PL_LANES = PL_TRACE_MANY,
-    PL_STREAM = 16,    /* rays that take steps in turn */
+    PL_STREAM = PL_LANES, /* rays that take steps in turn */
     PL_LEAST_LANES = 4 /* fewer rays don't gain from going together */
 };
 

@@ -20,12 +20,17 @@ static inline uint64_t entry_of(float t, pl_ref ref)
     return (uint64_t)bits << 32 | ref;
 }
 
-/* Whether an entry lies beyond t_max: numbers that aren't negative compare like their bits. */
-static inline bool entry_is_beyond(uint64_t entry, float t_max)
+/* Entries above it lie beyond t_max: numbers that aren't negative compare like their bits. */
+static inline uint64_t limit_of(float t_max)
 {
     uint32_t bits;
     memcpy(&bits, &t_max, sizeof bits);
-    return ((uint32_t)(entry >> 32) & ~(uint32_t)(PL_FRONT_WIDTH - 1)) > bits;
+    return (uint64_t)(bits | (PL_FRONT_WIDTH - 1)) << 32 | UINT32_MAX;
+}
+
+static inline bool entry_is_beyond(uint64_t entry, float t_max)
+{
+    return entry > limit_of(t_max);
 }
 
 /* --- entering an instance --- */
@@ -330,6 +335,13 @@ static inline bool make_room(walk *k)
     return true;
 }
 
+/* Leaves out what lies beyond t_max among the ENTRIES_AT_ONCE on top. The way back never does. */
+static inline void pass_beyond(walk *k)
+{
+    const uint32_t within = entries_within(k->stack + k->top - ENTRIES_AT_ONCE, limit_of(k->t_max));
+    k->top -= (size_t)__builtin_clz(within << 1 | 1) + ENTRIES_AT_ONCE - 31;
+}
+
 /* Pushes what the frame begins with, below it the way back. */
 static inline bool begin(walk *k, bool met)
 {
@@ -349,18 +361,22 @@ static inline bool set_off(walk *k, pl_bvh_lane *lane, pl_query *query, uint32_t
     k->lane = lane;
     k->query = query;
     k->steps = 0;
-    k->top = 0;
+    k->top = ENTRIES_AT_ONCE; /* pass_beyond reads them */
+    memset(lane->stack, 0, ENTRIES_AT_ONCE * sizeof *lane->stack);
     k->base = base;
     look(k, base, local_t_max(&lane->frames[base], query->t_max));
     return begin(k, met);
 }
 
-/* The end of a frame. */
+/* The end of a frame, and of those above in which nothing is left. */
 static inline enum progress go_back(walk *k)
 {
-    if (k->frame == k->base) return ENDED;
-    look(k, k->frame - 1, local_t_max(k->f - 1, k->query->t_max));
-    return UNDER_WAY;
+    for (;; k->top--) {
+        if (k->frame == k->base) return ENDED;
+        look(k, k->frame - 1, local_t_max(k->f - 1, k->query->t_max));
+        pass_beyond(k);
+        if ((pl_ref)k->stack[k->top - 1] >> PL_REF_SHIFT != PL_KIND_RETURN) return UNDER_WAY;
+    }
 }
 
 /* An instance, and what it begins with. */
@@ -393,6 +409,7 @@ static inline enum progress settle_primitive(pl_tracer *tracer, walk *k, pl_ref 
     else if (!evaluate(tracer, k->lane, k->frame, ref, query)) return FAILED;
     if (query->done) return ENDED;
     k->t_max = local_t_max(k->f, query->t_max);
+    pass_beyond(k);
     return count_step(k) ? UNDER_WAY : FAILED;
 }
 

@@ -456,9 +456,9 @@ bool PACKET_KERNEL(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, uns
     if (!pl_bvh_grow_packets(w, 0, queries->error) || !pl_bvh_grow_packet_stack(w, 0, queries->error)) return false;
     const pl_front *front = ((const pl_fronts *)tracer->scene->structure)->list;
     if (!make_packet(w->packets, front, rays, queries, count, t_max)) {
-        if (count <= PL_STREAM) return STREAM_KERNEL(tracer, rays, queries, count);
-        return PACKET_KERNEL(tracer, rays, queries, PL_STREAM) &&
-               PACKET_KERNEL(tracer, rays + PL_STREAM, queries + PL_STREAM, count - PL_STREAM);
+        if (count <= PL_LANES / 2) return STREAM_KERNEL(tracer, rays, queries, count);
+        return PACKET_KERNEL(tracer, rays, queries, PL_LANES / 2) &&
+               PACKET_KERNEL(tracer, rays + PL_LANES / 2, queries + PL_LANES / 2, count - PL_LANES / 2);
     }
     w->lanes->frames[0].front = front;
     w->lanes->frames[0].instance = 0;

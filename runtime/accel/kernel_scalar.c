@@ -77,6 +77,16 @@ static inline wide wide_min(wide a, wide b)
     return a;
 }
 
+enum { ENTRIES_AT_ONCE = 4 };
+
+/* Which of so many entries don't exceed a limit. */
+static inline uint32_t entries_within(const uint64_t *entries, uint64_t limit)
+{
+    uint32_t within = 0;
+    for (int i = 0; i < ENTRIES_AT_ONCE; i++) within |= (uint32_t)(entries[i] <= limit) << i;
+    return within;
+}
+
 /* Entries of the children whose enter <= leave, the nearest last; their number. */
 static inline unsigned wide_list(wide enter, wide leave, const pl_ref *child, uint64_t *entries)
 {

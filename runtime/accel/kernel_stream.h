@@ -7,31 +7,41 @@
 /* Rays under way, and what each comes to in this round: sets of rays, a bit each. */
 typedef struct crowd {
     walk walks[PL_STREAM];
-    unsigned left, nodes, instances, primitives, returns;
+    uint32_t left, nodes, instances, primitives, returns;
     uint64_t steps; /* of all */
 } crowd;
 
 /* For each ray i of a set. */
 #define EACH(i, set) \
-    for (unsigned rest_ = set, i = 0; rest_ && (i = (unsigned)__builtin_ctz(rest_), true); rest_ &= rest_ - 1)
+    for (uint32_t rest_ = set, i = 0; rest_ && (i = (uint32_t)__builtin_ctz(rest_), true); rest_ &= rest_ - 1)
 
-/* Where the set of a reference's kind lies in the 64 bits of four sets: nodes, instances, returns, primitives. */
-_Static_assert(PL_STREAM <= 16, "a set has 16 bits");
+/* Where the set of a reference's kind lies in the 64 bits of four sets of sixteen rays: nodes, instances, returns, primitives. */
 static const uint8_t SET_OF_KIND[16] = {0, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 16, 32, 48};
+_Static_assert(PL_STREAM == 32, "two halves of sixteen");
 
-/* Takes the next entry of each ray, which stays above the top of its stack. */
-static inline void sort_out(crowd *c)
+/* Takes the next entry of some of sixteen rays, which stays above the tops of their stacks. Their four sets. */
+static inline uint64_t sort_half(walk *walks, uint32_t left)
 {
     uint64_t sets = 0;
-    EACH(i, c->left) {
-        walk *k = &c->walks[i];
+    EACH(i, left) {
+        walk *k = &walks[i];
         const uint64_t at = k->stack[--k->top];
         sets |= (uint64_t)!entry_is_beyond(at, k->t_max) << (SET_OF_KIND[(pl_ref)at >> PL_REF_SHIFT] + i);
     }
-    c->nodes = (uint16_t)sets;
-    c->instances = (uint16_t)(sets >> 16);
-    c->returns = (uint16_t)(sets >> 32);
-    c->primitives = (uint16_t)(sets >> 48);
+    return sets;
+}
+
+/* A set of all rays of those of the two halves. */
+#define BOTH(low, high, shift) ((uint16_t)((low) >> (shift)) | (uint32_t)((high) >> (shift)) << 16)
+
+/* Takes the next entry of each ray. */
+static inline void sort_out(crowd *c)
+{
+    const uint64_t low = sort_half(c->walks, (uint16_t)c->left), high = sort_half(c->walks + 16, c->left >> 16);
+    c->nodes = BOTH(low, high, 0);
+    c->instances = BOTH(low, high, 16);
+    c->returns = BOTH(low, high, 32);
+    c->primitives = BOTH(low, high, 48);
 }
 
 static inline pl_ref next_of(const walk *k)

@@ -56,6 +56,21 @@ static inline __m128i four_sort(__m128i v)
 }
 #endif
 
+enum { ENTRIES_AT_ONCE = 8 };
+
+/* Which of so many entries don't exceed a limit. */
+static inline uint32_t entries_within(const uint64_t *entries, uint64_t limit)
+{
+#ifdef __AVX512VL__
+    return _mm512_cmple_epu64_mask(_mm512_loadu_si512(entries), _mm512_set1_epi64((int64_t)limit));
+#else
+    const __m256i most = _mm256_set1_epi64x((int64_t)limit); /* entries have no sign */
+    const __m256i low = _mm256_cmpgt_epi64(_mm256_loadu_si256((const __m256i *)entries), most);
+    const __m256i high = _mm256_cmpgt_epi64(_mm256_loadu_si256((const __m256i *)(entries + 4)), most);
+    return 0xFF ^ (uint32_t)(_mm256_movemask_pd((__m256d)low) | _mm256_movemask_pd((__m256d)high) << 4);
+#endif
+}
+
 /* Entries of the children whose enter <= leave, the nearest last; their number. Writes all eight places. No branches. */
 static inline __attribute__((always_inline)) unsigned wide_list(wide enter, wide leave, const pl_ref *child, uint64_t *entries)
 {

@@ -223,9 +223,9 @@ bool TERRAIN_PACKET(pl_tracer *tracer, const pl_terrain *terrain, const pl_ray *
         if (course == ASTRAY) goto end;
         beams = course == TOGETHER && look_along(c.frame);
     }
-    if (!beams && count > PL_STREAM)
-        return TERRAIN_PACKET(tracer, terrain, rays, queries, PL_STREAM) &&
-               TERRAIN_PACKET(tracer, terrain, rays + PL_STREAM, queries + PL_STREAM, count - PL_STREAM);
+    if (!beams && count > PL_LANES / 2)
+        return TERRAIN_PACKET(tracer, terrain, rays, queries, PL_LANES / 2) &&
+               TERRAIN_PACKET(tracer, terrain, rays + PL_LANES / 2, queries + PL_LANES / 2, count - PL_LANES / 2);
     ok = beams ? travel_as_beam(tracer, &c, w->packet_stack)
                : travel_as_stream(tracer, terrain, rays, queries, count, w->packet_stack);
 end:
