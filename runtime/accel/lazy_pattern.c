@@ -293,13 +293,11 @@ pl_lazy_state *pl_unfolder_write(pl_unfolder *u, uint32_t symbol, void *memory, 
 {
     const uint64_t *key = u->key.data;
     const pl_lazy_pattern *pattern = u->pattern;
-    char *at = memory;
+    pl_lazy_state *state = memory;
     if (!pattern) {
-        pattern = write_pattern(u, symbol, at);
-        at += layout_of(u).total;
+        pattern = write_pattern(u, symbol, (char *)memory + state_bytes(u->drafts.count, u->draws.count));
         if (u->sharing) u->place->pattern = pattern;
     }
-    pl_lazy_state *state = (pl_lazy_state *)at;
     *state = (pl_lazy_state){.key = key[0], .pattern = pattern};
     for (uint32_t i = 0; i < pattern->item_count; i++) atomic_init(&state->below[i], NULL);
     char *drawn = (char *)&state->below[pattern->item_count];
