@@ -41,11 +41,29 @@ static inline __attribute__((always_inline)) void meet_lane(const pl_packet_fram
     *leave = wide_min(wide_min(far_t[0], far_t[1]), wide_min(far_t[2], wide_set(f->t_max[lane])));
 }
 
+/* Entries of a node's children whose enter <= leave, the nearest last (alone it isn't written), with their lanes in own;
+ * *lanes become those of the nearest. Returns their number. */
+static inline __attribute__((always_inline)) unsigned order_children(wide enter, wide leave, const pl_front_node *node,
+                                                                    const uint32_t *lanes_of, unsigned *lanes, uint64_t *entries,
+                                                                    uint32_t *own, pl_ref *nearest)
+{
+    static const pl_ref numbers[PL_FRONT_WIDTH] = {0, 1, 2, 3, 4, 5, 6, 7};
+    pl_ref number = 0;
+    const unsigned count = wide_order(enter, leave, numbers, entries, &number);
+    *nearest = node->child[number];
+    *lanes = lanes_of[number];
+    for (unsigned i = 0; i + 1 < count; i++) {
+        number = (pl_ref)entries[i];
+        entries[i] ^= number ^ node->child[number];
+        own[i] = lanes_of[number];
+    }
+    return count;
+}
+
 /* As meet_nearest, for each of *lanes. *lanes become those of the nearest child, own those of the entries. */
 static inline unsigned meet_each(const pl_packet_frame *f, unsigned *lanes, const pl_front_node *node, uint64_t *entries, uint32_t *own,
                                  pl_ref *nearest)
 {
-    static const pl_ref numbers[PL_FRONT_WIDTH] = {0, 1, 2, 3, 4, 5, 6, 7};
     _Alignas(32) uint32_t lanes_of[PL_FRONT_WIDTH];
     wide enter, leave, first = wide_set(INFINITY), met = wide_set(0.0f);
     if (!(*lanes & (*lanes - 1))) {
@@ -61,16 +79,7 @@ static inline unsigned meet_each(const pl_packet_frame *f, unsigned *lanes, cons
         met = _mm256_or_ps(_mm256_andnot_ps(missed, lane), met);
     }
     _mm256_store_ps((float *)lanes_of, met);
-    pl_ref number = 0;
-    const unsigned count = wide_order(first, wide_set(FLT_MAX), numbers, entries, &number);
-    *nearest = node->child[number];
-    *lanes = lanes_of[number];
-    for (unsigned i = 0; i + 1 < count; i++) {
-        number = (pl_ref)entries[i];
-        entries[i] ^= number ^ node->child[number];
-        own[i] = lanes_of[number];
-    }
-    return count;
+    return order_children(first, wide_set(FLT_MAX), node, lanes_of, lanes, entries, own, nearest);
 }
 
 /* The lanes whose t_max an entry doesn't lie beyond. */

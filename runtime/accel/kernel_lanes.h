@@ -125,8 +125,8 @@ static inline unsigned filter_lanes(const pl_front_primitive *p, uint32_t kind, 
     if (kind == PL_KIND_MESH || kind == PL_SHAPE_PLANE) return lanes;
     const float margin = p->stretch * f->slack + 0x1p-19f, *m = p->columns;
     unsigned found = 0;
-    for (int first = 0; first < PL_LANES; first += HALF) {
-        if (!(lanes >> first & 0xFF)) continue;
+    for (unsigned rest = lanes, first; rest; rest &= ~(0xFFu << first)) {
+        first = (unsigned)__builtin_ctz(rest) & ~7u;
         wide o[3], d[3];
         const wide x = wide_load(f->origin[0] + first), y = wide_load(f->origin[1] + first);
         const wide z = wide_load(f->origin[2] + first), u = wide_load(f->direction[0] + first);

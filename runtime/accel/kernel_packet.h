@@ -4,7 +4,7 @@
  * In nodes of the scene's front a packet is one *beam*: intervals of its origins and of its directions' inverses, so that a
  * child is met or missed for all rays at once by about twice the arithmetic of one ray (interval arithmetic in packets:
  * Boulos, Wald & Shirley 2006, "Geometric and arithmetic culling methods for entire ray packets"). Below it the rays have
- * spread: nodes are told for each ray (kernel_each.h). At instances and primitives rays are told apart eight at a time.
+ * spread: nodes are told for each ray (kernel_each.h). Boxes of instances and primitives are told for each ray in either case.
  * Three or fewer go on one by one.
  *
  * The same filters, wider: candidates are mapped down the path and evaluated as those of single rays are, so packets
@@ -14,25 +14,12 @@
 #include "kernel_offer.h"
 #include "kernel_alone.h"
 #include "kernel_each.h"
+#include "kernel_beam.h"
 
 /* So few go on alone. */
 enum { FEW = 3 };
 
 /* --- frames --- */
-
-/* Widens intervals by the rays of some lanes. */
-static inline void span_of(const float *values, unsigned lanes, float *least, float *most)
-{
-    const wide high = wide_set(INFINITY);
-    wide low = high, top = -high;
-    for (int first = 0; first < PL_LANES; first += HALF) {
-        const wide some = wide_load(values + first), in = wide_lanes(lanes >> first & 0xFF);
-        low = wide_min(_mm256_blendv_ps(high, some, in), low);
-        top = wide_max(_mm256_blendv_ps(-high, some, in), top);
-    }
-    *least = wide_least(low);
-    *most = wide_most(top);
-}
 
 /* t_max of all rays in the frame's own t; *most: of its lanes. */
 static inline void set_t_max(pl_packet_frame *f, const double *t_max)
@@ -150,48 +137,6 @@ static enum course begin_lanes(pl_packet_frame *f, unsigned lanes, const double 
     if (!f->lanes) return ASTRAY;
     if (far > far_of(f->front) && !move_lanes(f, wide_least(all.least), far, t_max)) return APART;
     return __builtin_popcount(f->lanes) <= FEW ? ONE_BY_ONE : TOGETHER;
-}
-
-/* --- beams --- */
-
-/* The rays of a frame's lanes become its beam. false: they go different ways. */
-static inline bool look_along(pl_packet_frame *f)
-{
-    pl_beam *b = &f->beam;
-    for (int axis = 0; axis < 3; axis++) {
-        float o_least, o_most, least, most;
-        span_of(f->inverse[axis], f->lanes, &least, &most);
-        const bool negative = most < 0.0f;
-        if (!negative && !(least > 0.0f)) return false;
-        span_of(f->origin[axis], f->lanes, &o_least, &o_most);
-        if (o_most - o_least > f->front->wide) return false;
-        o_least -= f->slack;
-        o_most += f->slack;
-        b->near_o[axis] = negative ? o_least : o_most;
-        b->far_o[axis] = negative ? o_most : o_least;
-        b->least[axis] = least;
-        b->most[axis] = most;
-        b->near_row[axis] = (uint32_t)(negative ? 3 + axis : axis) * PL_FRONT_WIDTH;
-        b->far_row[axis] = (uint32_t)(negative ? axis : 3 + axis) * PL_FRONT_WIDTH;
-    }
-    float least;
-    span_of(f->t_max, f->lanes, &least, &f->most);
-    return true;
-}
-
-/* As meet. */
-static inline unsigned meet_beam(const pl_beam *b, float t_max, const pl_front_node *node, uint64_t *entries, pl_ref *nearest)
-{
-    wide enter = wide_set(0.0f), leave = wide_set(t_max);
-#pragma GCC unroll 3
-    for (int axis = 0; axis < 3; axis++) {
-        const wide near = wide_load(node->planes[0] + b->near_row[axis]) - wide_set(b->near_o[axis]);
-        const wide far = wide_load(node->planes[0] + b->far_row[axis]) - wide_set(b->far_o[axis]);
-        const wide least = wide_set(b->least[axis]), most = wide_set(b->most[axis]);
-        enter = wide_max(wide_min(near * least, near * most), enter);
-        leave = wide_min(wide_max(far * least, far * most), leave);
-    }
-    return wide_order(enter, leave, node->child, entries, nearest);
 }
 
 /* Those of some lanes whose queries want more. */

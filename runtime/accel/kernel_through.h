@@ -8,7 +8,7 @@
 /* Where a packet goes on, on the work's stack; pointers to it are kept here, until it grows. */
 typedef struct packet_way {
     uint64_t *stack;
-    uint32_t *own; /* the lanes that an entry is for, where its frame tells nodes for each ray */
+    uint32_t *own; /* the lanes that an entry is for */
     size_t top;
     uint64_t steps;
 } packet_way;
@@ -33,15 +33,15 @@ static inline __attribute__((always_inline)) bool go_through_nodes(packet_way *w
     for (;;) {
         const uint64_t at = way->stack[--way->top];
         *ref = (pl_ref)at;
-        *some = f->lanes;
-        if (f->each) *some &= way->own[way->top] & lanes_within(f, at);
+        *some = f->lanes & way->own[way->top];
+        if (f->each) *some &= lanes_within(f, at);
         else if (entry_is_beyond(at, f->most)) continue;
         if (!*some && *ref >> PL_REF_SHIFT != PL_KIND_RETURN) continue;
         for (;;) {
             if (*ref >> PL_REF_SHIFT != PL_KIND_NODE) return true;
             const pl_front_node *node = &f->front->nodes[*ref];
             const unsigned count = f->each ? meet_each(f, some, node, way->stack + way->top, way->own + way->top, ref)
-                                           : meet_beam(&f->beam, f->most, node, way->stack + way->top, ref);
+                                           : meet_together(f, some, node, way->stack + way->top, way->own + way->top, ref);
             way->steps++;
             if (count == 0) break;
             way->top += count - 1;
