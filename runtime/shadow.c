@@ -109,8 +109,9 @@ static void sort_by_depth(pl_shine *shines, unsigned count, pl_shine **sorted)
     unsigned begin[DRAWERS + 1] = {0};
     double nearest = INFINITY, farthest = 0.0;
     for (unsigned i = 0; i < count; i++) {
-        nearest = fmin(shines[i].at->depth, nearest);
-        farthest = fmax(shines[i].at->depth, farthest);
+        const double depth = shines[i].at->depth;
+        nearest = depth < nearest ? depth : nearest;
+        farthest = depth > farthest ? depth : farthest;
     }
     const double scale = farthest > nearest ? (DRAWERS - 1) / (farthest - nearest) : 0.0;
     for (unsigned i = 0; i < count; i++) {

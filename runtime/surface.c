@@ -67,11 +67,15 @@ static bool take_texture(pl_tracer *tracer, double t, pl_surface *surface, pl_er
 static inline __attribute__((always_inline)) void turn_normal_back(const pl_transform *transform, double n[3])
 {
     pl_affine room;
-    const double *m = pl_transform_entries(transform, room.m);
-    if (transform->form == PL_FORM_TRANSLATION) return;
-    if (transform->form <= PL_FORM_PACKED) pl_affine_normal((const pl_affine *)m, n, n);
-    else
+    const double *m = transform->to_object.m;
+    switch ((pl_form)transform->form) {
+    case PL_FORM_PACKED: pl_transform_unpack(transform, room.m); pl_affine_normal(&room, n, n); return;
+    case PL_FORM_GENERAL: pl_affine_normal(&transform->to_object, n, n); return;
+    case PL_FORM_DIAGONAL:
         for (int axis = 0; axis < 3; axis++) n[axis] *= m[5 * axis];
+        return;
+    case PL_FORM_TRANSLATION: return;
+    }
 }
 
 static inline double size_of(const double n[3])
@@ -122,9 +126,10 @@ static void begin_normals(leaf_surface *leaf, const pl_hit *hit, pl_surface *sur
 
 static void set_unit(double n[3])
 {
-    double size = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
+    const double x = fabs(n[0]), y = fabs(n[1]), z = fabs(n[2]), wide = x > y ? x : y; /* fmax is a call */
+    const double size = wide > z ? wide : z;
     for (int axis = 0; axis < 3; axis++) n[axis] /= size;
-    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     for (int axis = 0; axis < 3; axis++) n[axis] /= length;
 }
 

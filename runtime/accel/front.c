@@ -108,7 +108,8 @@ static float wide_of(const pl_front_items *items)
     return (float)fmin(WIDEST, WIDE_ITEMS * sum / (double)(items->box_count + 1));
 }
 
-/* Whether a ray that comes to a front meets one of its primitives as a rule: their boxes have more surface than its own. */
+/* Whether a ray that comes to a front meets one of its primitives as a rule: their boxes have twice the surface of its own, since
+ * not all who meet a box meet what is in it. */
 static bool is_dense(const pl_front *front, const pl_front_items *items)
 {
     const float *half = front->half;
@@ -118,7 +119,7 @@ static bool is_dense(const pl_front *front, const pl_front_items *items)
         const float x = box->hi[0] - box->lo[0], y = box->hi[1] - box->lo[1], z = box->hi[2] - box->lo[2];
         if (box->ref >> PL_REF_SHIFT != PL_KIND_INSTANCE) sum += x * y + y * z + z * x;
     }
-    return sum > 4.0f * (half[0] * half[1] + half[1] * half[2] + half[2] * half[0]);
+    return sum > 8.0f * (half[0] * half[1] + half[1] * half[2] + half[2] * half[0]);
 }
 
 /* Builds a front's tree and gives it its items; what they were listed with is freed. */

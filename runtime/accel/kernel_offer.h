@@ -134,6 +134,17 @@ static bool offer_lane(pl_tracer *tracer, uint32_t index, pl_ref ref, int lane, 
     return true;
 }
 
+/* Those of some lanes that can meet a plane: they begin on one side and go to the other. */
+static inline unsigned lanes_to_plane(const pl_lanes *rays, unsigned lanes)
+{
+    unsigned towards = 0;
+    for (int first = 0; first < PL_LANES; first += 4) {
+        const four o = _mm256_loadu_pd(rays->o[2] + first), d = _mm256_loadu_pd(rays->d[2] + first);
+        towards |= (unsigned)_mm256_movemask_pd(_mm256_xor_pd(o, d)) << first;
+    }
+    return towards & lanes;
+}
+
 /* Evaluates a primitive of frame `index` for some lanes and offers it to their queries. */
 static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned lanes, pl_query *queries, double *t_max)
 {
@@ -161,6 +172,7 @@ static bool offer_lanes(pl_tracer *tracer, uint32_t index, pl_ref ref, unsigned 
     tracer->counters.primitive_tests += (unsigned)__builtin_popcount(lanes);
     const pl_bvh_place place = {w->lanes, index, ref};
     pl_leaf leaf = pl_bvh_leaf(scene, leaf_item, &place);
+    if (leaf.shape == PL_SHAPE_PLANE && !leaf.mesh) lanes = lanes_to_plane(&rays, lanes);
     for (; lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
         const double o[3] = {rays.o[0][lane], rays.o[1][lane], rays.o[2][lane]};
