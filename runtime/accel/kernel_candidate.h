@@ -13,15 +13,12 @@ static inline __attribute__((always_inline)) void map_step(const pl_transform *t
         const double4 x = {m[0], m[4], m[8]}, y = {m[1], m[5], m[9]}, z = {m[2], m[6], m[10]};
         *o = x * (*o)[0] + y * (*o)[1] + z * (*o)[2] + (double4){m[3], m[7], m[11]};
         *d = x * (*d)[0] + y * (*d)[1] + z * (*d)[2];
-        return;
+    } else { /* a translation scales by 1 */
+        const double *m = transform->to_object.m;
+        const double4 scale = {m[0], m[5], m[10]}, offset = {m[3], m[7], m[11]};
+        *o = *o * scale + offset;
+        *d = *d * scale;
     }
-    const double *m = transform->to_object.m;
-    if (transform->form == PL_FORM_DIAGONAL) {
-        const double4 scale = {m[0], m[5], m[10]};
-        *o *= scale;
-        *d *= scale;
-    }
-    *o += (double4){m[3], m[7], m[11]};
 }
 
 /* Maps a ray from a front's state to an item of an opened node and the leaf that it leads to (NULL: it is an instance), one
