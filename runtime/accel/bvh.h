@@ -26,7 +26,6 @@ typedef struct pl_frame {
 
 enum {
     PL_LANES = PL_TRACE_MANY,
-    PL_STREAM = PL_LANES, /* rays that take steps in turn */
     PL_LEAST_LANES = 4 /* fewer rays don't gain from going together */
 };
 
@@ -88,7 +87,7 @@ extern pl_bvh_kernel pl_bvh_trace_scalar, pl_bvh_trace_avx2, pl_bvh_trace_avx512
 /* Of several rays, whether or not they go the same way. */
 typedef bool pl_bvh_many_kernel(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, unsigned count);
 extern pl_bvh_many_kernel pl_bvh_packet_avx2;
-/* At most PL_STREAM. */
+/* Rays that take steps in turn, at most PL_LANES. */
 extern pl_bvh_many_kernel pl_bvh_stream_scalar, pl_bvh_stream_avx2, pl_bvh_stream_avx512;
 /* Rays go well together as a packet where all directions lie about the first's, by this share of its size (sums of axes), and
  * origins no farther away than this share of half the size of what is traced: shadow rays of a tile begin far apart in depth. */

@@ -6,7 +6,7 @@
 
 /* Rays under way, and what each comes to in this round: sets of rays, a bit each. */
 typedef struct crowd {
-    walk walks[PL_STREAM];
+    walk walks[PL_LANES];
     uint32_t left, nodes, instances, primitives, returns;
     uint64_t steps; /* of all */
 } crowd;
@@ -17,7 +17,7 @@ typedef struct crowd {
 
 /* Where the set of a reference's kind lies in the 64 bits of four sets of sixteen rays: nodes, instances, returns, primitives. */
 static const uint8_t SET_OF_KIND[16] = {0, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 16, 32, 48};
-_Static_assert(PL_STREAM == 32, "two halves of sixteen");
+_Static_assert(PL_LANES == 32, "two halves of sixteen");
 
 /* Takes the next entry of some of sixteen rays, which stays above the tops of their stacks. Their four sets. */
 static inline uint64_t sort_half(walk *walks, uint32_t left)
