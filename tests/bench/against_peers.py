@@ -3,8 +3,20 @@
 from __future__ import annotations
 
 import peers
-from common import ALL, SETS, Bench, against_embree, curves_of, median, pixels_traced, rate, rays_of_a_picture, same_hits
-from peers import ours, plsys
+from common import (
+    ALL,
+    SETS,
+    Bench,
+    against_embree,
+    curves_of,
+    median,
+    pixels_traced,
+    rate,
+    ratios,
+    rays_of_a_picture,
+    same_hits,
+)
+from peers import plsys
 from prepare import (
     CURVES,
     QUADS,
@@ -16,23 +28,20 @@ from prepare import (
     write_embree,
 )
 from report import size
+from turns import alone, ours, take_turns
 
 
 def figure(bench: Bench) -> None:
     """Figure 2.1's tree, order 10."""
     case = Case("Fig 2.1", "tree", {"order": 10}, bench.folder)
     scene = write_embree(case.folder / "flat.bin", [(CURVES, curves_of(case))], [])
-    pure = against_embree(bench, case, scene, {}, {}, "of Embree single rays")
+    pure = against_embree(bench, case, scene, "of Embree single rays")
+    flattened = {"front_items": ALL}
     flat = against_embree(
-        bench,
-        case,
-        scene,
-        {"front_items": ALL},
-        {"coherent": 2.5, "random": 1.5},
-        "flattened, of Embree single rays",
+        bench, case, scene, "flattened, of Embree single rays", {"coherent": 2.5, "random": 1.5}, flattened
     )
     if pure and flat:
-        default = ours(case, options={"front_items": 64})
+        default = alone(ours(case, sets=False, options={"front_items": 64}))
         bench.results.row(
             case.name, "memory with fronts of 64 items", default["scene_bytes"] / 1e3, 40, " KB", at_most=True
         )
@@ -66,21 +75,21 @@ def order20(bench: Bench) -> None:
     case = Case("order 20", "tree", {"order": 20}, bench.folder)
     scene = write_embree(case.folder / "flat.bin", [(CURVES, curves_of(case))], [])
     last = against_embree(
-        bench, case, scene, {}, {"coherent": 1.0, "random": 2.0}, "of Embree flat, single rays"
+        bench, case, scene, "of Embree flat, single rays", {"coherent": 1.0, "random": 2.0}
     )
     if last:
         memory(bench, case, last, 1, 0.5)
         same_hits(bench, case, last[1])
     sixteen = Case("order 16", "tree", {"order": 16}, bench.folder)
-    flat = [ours(sixteen, options={"front_items": ALL}, repeats=1) for _ in range(bench.rounds)]
+    flat = [alone(ours(sixteen, sets=False, options={"front_items": ALL})) for _ in range(bench.rounds)]
     bench.results.row(
         sixteen.name, "building, a primitive that is flattened", [1e6 * f["build_seconds"] / f["primitives"] for f in flat], 0.6, " µs",
         at_most=True, ours=f"{flat[0]['primitives']:,} of them",
     )  # fmt: skip
-    boxes, bvh = ours(case, options={"accelerator": "boxes"}, repeats=1), ours(case)
+    bvh, boxes = take_turns([ours(case), ours(case, options={"accelerator": "boxes"})], 1)
     for name in SETS:
         bench.results.row(
-            case.name, f"{name}: bvh of the paper's boxes", rate(bvh, name) / rate(boxes, name), 30 if name == "coherent" else None,
+            case.name, f"{name}: bvh of the paper's boxes", ratios(bvh, boxes, name), 30 if name == "coherent" else None,
             ours=f"{rate(bvh, name):.2f} Mray/s", theirs=f"{rate(boxes, name):.4f}",
         )  # fmt: skip
     mine = [pixels_traced(case) for _ in range(bench.rounds)]
@@ -108,7 +117,7 @@ def menger(bench: Bench) -> None:
     quads = box_quads(case.unfolded()[1])
     scene = write_embree(case.folder / "quads.bin", [(QUADS, quads)], [])
     last = against_embree(
-        bench, case, scene, {}, {"coherent": 1.3, "random": 3.4}, "of Embree single rays, quads"
+        bench, case, scene, "of Embree single rays, quads", {"coherent": 1.3, "random": 3.4}
     )
     if last:
         bench.results.row(
@@ -123,27 +132,23 @@ def menger(bench: Bench) -> None:
         same_hits(bench, case, last[1])
         for width in (8, 16):
             bench.results.row(
-                case.name, f"coherent: of Embree's packets of {width}", rate(last[0], "coherent") / rate(last[1], "coherent", f"packets{width}"),
+                case.name, f"coherent: of Embree's packets of {width}", ratios(*last, "coherent", f"packets{width}"),
                 1.0 if width == 8 else None, theirs=f"{rate(last[1], 'coherent', f'packets{width}'):.2f} Mray/s",
             )  # fmt: skip
     if not bench.quick:
         triangles = write_embree(case.folder / "triangles.bin", [(TRIANGLES, triangles_of(quads))], [])
-        against_embree(bench, case, triangles, {}, {}, "of Embree 3.13 triangles")
-        against_embree(bench, case, triangles, {}, {}, "of Embree 3.13 triangles, compact", flags="c")
-        against_embree(bench, case, triangles, {}, {}, "of Embree 3.13 triangles, robust", flags="r")
-        against_embree(bench, case, triangles, {}, {}, "of embreex 4.4 triangles", "4.4")
-    four = ours(case)
+        against_embree(bench, case, triangles, "of Embree 3.13 triangles")
+        against_embree(bench, case, triangles, "of Embree 3.13 triangles, compact", flags="c")
+        against_embree(bench, case, triangles, "of Embree 3.13 triangles, robust", flags="r")
+        against_embree(bench, case, triangles, "of embreex 4.4 triangles", version="4.4")
     for level, most, proportions in ((6, 0.2, (3.6 / 8.8, 2.8 / 4.5)), (10, 0.3, (None, 1.4 / 4.5))):
         deep = Case(f"Menger {level}", "menger", {"level": level}, bench.folder)
-        answers = [ours(deep) for _ in range(bench.rounds)]
-        if "failed" in answers[0]:
-            bench.results.note(deep.name, f"failed: {answers[0]['failed']}")
-            continue
-        bench.results.row(deep.name, "memory", answers[0]["scene_bytes"] / 1e6, most, " MB", at_most=True)
+        pairs = [take_turns([ours(deep), ours(case)], bench.turns) for _ in range(bench.rounds)]
+        bench.results.row(deep.name, "memory", pairs[0][0]["scene_bytes"] / 1e6, most, " MB", at_most=True)
         for name, proportion in zip(SETS, proportions):
             bench.results.row(
-                deep.name, f"{name}: of Menger 4's rate", [rate(a, name) / rate(four, name) for a in answers], proportion and round(proportion, 2),
-                ours=f"{median([rate(a, name) for a in answers]):.2f} Mray/s",
+                deep.name, f"{name}: of Menger 4's rate", sum((ratios(*pair, name) for pair in pairs), []), proportion and round(proportion, 2),
+                ours=f"{median([rate(m, name) for m, _ in pairs]):.2f} Mray/s", theirs=f"{median([rate(f, name) for _, f in pairs]):.2f}",
             )  # fmt: skip
     pairs = [(pixels_traced(deep, "--detail", "1"), pixels_traced(case)) for _ in range(bench.rounds)]
     bench.results.row(
@@ -166,14 +171,13 @@ def residency(bench: Bench) -> None:
             case = Case(f"{name} {value}", scene, {parameter: value}, bench.folder)
             path = write_embree(case.folder / "flat.bin", [(kind, flat(case))], [])
             last = against_embree(
-                bench, case, path, {}, beyond if case.name == "Menger 5" else {}, "of Embree flat, by size of scene"
+                bench, case, path, "of Embree flat, by size of scene", beyond if case.name == "Menger 5" else {}
             )
             path.unlink()
             if last:
-                mine, theirs = last
                 points.append(
-                    {"bytes": mine["scene_bytes"], "embree_bytes": theirs["bytes"]}
-                    | {n: rate(mine, n) / rate(theirs, n, "single") for n in SETS}
+                    {"bytes": last[0]["scene_bytes"], "embree_bytes": last[1]["bytes"]}
+                    | {n: median(ratios(*last, n, "single")) for n in SETS}
                 )
         bench.results.curves[f"residency: {name}"] = points
 
@@ -184,7 +188,7 @@ def forest(bench: Bench) -> None:
     groups, instances = split_forest(case)
     scene = write_embree(case.folder / "two-level.bin", [(CURVES, g) for g in groups], instances)
     last = against_embree(
-        bench, case, scene, {}, {"coherent": 1.6, "random": 1.6}, f"of Embree two-level, {len(groups)} kinds"
+        bench, case, scene, f"of Embree two-level, {len(groups)} kinds", {"coherent": 1.6, "random": 1.6}
     )
     if last:
         memory(bench, case, last, 4, 12)
@@ -195,7 +199,9 @@ def terrain(bench: Bench) -> None:
     """Midpoint displacement: 2,097,152 different triangles, against Embree on the same ones."""
     case = Case("terrain", "terrain", {"level": 10}, bench.folder)
     scene = write_embree(case.folder / "triangles.bin", [(TRIANGLES, case.triangles())], [])
-    last = against_embree(bench, case, scene, {}, {"coherent": 1.0, "random": 1.0}, "of Embree triangles, single rays")
+    last = against_embree(
+        bench, case, scene, "of Embree triangles, single rays", {"coherent": 1.0, "random": 1.0}
+    )
     if not last:
         return
     bench.results.row(

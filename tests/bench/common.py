@@ -1,7 +1,6 @@
 """What the bench's measures share: ratios of rates against Embree, agreement of hits, rendered pictures.
 
-Ratios are ours : theirs, of the same rays in the same round; rounds alternate between the programs, so that a noisy
-machine disturbs both.
+Ratios are ours : theirs, of the same rays in the same turn (turns.py).
 """
 
 from __future__ import annotations
@@ -11,9 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from peers import embree, ours, plsys
+from peers import plsys
 from prepare import Case, cone_curves
 from report import Results
+from turns import alone, embree, ours, take_turns
 
 ALL = 2**64 - 1
 SETS = ("coherent", "random")
@@ -27,7 +27,13 @@ class Bench:
 
     @property
     def rounds(self) -> int:
+        """Processes of each program."""
         return 1 if self.quick else 3
+
+    @property
+    def turns(self) -> int:
+        """Of programs that trace rays by turns, a process."""
+        return 5 if self.quick else 3
 
 
 def median(values) -> float:
@@ -35,26 +41,28 @@ def median(values) -> float:
 
 
 def rate(answer: dict, name: str, key: str = "rates") -> float:
-    return answer["sets"][name][key][1]
+    """Of several turns."""
+    return median(answer["sets"][name][key])
 
 
-def against_embree(bench: Bench, case: Case, scene: Path, options: dict, targets: dict, what: str, version: str = "3.13", key: str = "single",
-                   flags: str = "-") -> tuple[dict, dict] | None:  # fmt: skip
+def ratios(mine: dict, theirs: dict, name: str, key: str = "rates") -> list[float]:
+    """Of each turn."""
+    return [a / b for a, b in zip(mine["sets"][name]["rates"], theirs["sets"][name][key], strict=True)]
+
+
+def against_embree(
+    bench: Bench, case: Case, scene: Path, what: str, targets: dict | None = None, options: dict | None = None,
+    version: str = "3.13", flags: str = "",
+) -> tuple[dict, dict] | None:  # fmt: skip
     """Rows of ratios for both kinds of rays; the last answers of both."""
-    pairs = []
-    for _ in range(bench.rounds):
-        mine, theirs = ours(case, options=options), embree(case, scene, case.folder, version, flags)
-        if "failed" in mine:
-            bench.results.note(case.name, f"{what}: ours failed: {mine['failed']}")
-            return None
-        if theirs is None:
-            return None
-        pairs.append((mine, theirs))
+    peer = embree(case, scene, version, flags)
+    if peer is None:
+        return None
+    pairs = [take_turns([ours(case, options=options or {}), peer], bench.turns) for _ in range(bench.rounds)]
     for name in SETS:
-        ratios = [rate(mine, name) / rate(theirs, name, key) for mine, theirs in pairs]
         bench.results.row(
-            case.name, f"{name}: {what}", ratios, targets.get(name),
-            ours=f"{median([rate(m, name) for m, _ in pairs]):.2f} Mray/s", theirs=f"{median([rate(t, name, key) for _, t in pairs]):.2f}",
+            case.name, f"{name}: {what}", sum((ratios(*pair, name, "single") for pair in pairs), []), (targets or {}).get(name),
+            ours=f"{median([rate(m, name) for m, _ in pairs]):.2f} Mray/s", theirs=f"{median([rate(t, name, 'single') for _, t in pairs]):.2f}",
         )  # fmt: skip
     return pairs[-1]
 
@@ -62,7 +70,7 @@ def against_embree(bench: Bench, case: Case, scene: Path, options: dict, targets
 def same_hits(bench: Bench, case: Case, answer: dict) -> None:
     """Says how many rays Embree answers otherwise, so that nobody compares unlike things."""
     path = case.folder / "hits.npz"
-    ours(case, hits=str(path), repeats=1)
+    alone(ours(case, hits=str(path), most_seconds=1e9), 1)
     with np.load(path) as mine:
         for name in SETS:
             a, b = mine[name], answer["t"][name]

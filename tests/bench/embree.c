@@ -1,6 +1,6 @@
 /* embree.c - the peer: traces rays with Embree, 3.13 or 4.4, and says how fast.
  *
- *     embree LIBRARY SCENE RAYS REPEATS FLAGS [HITS]      FLAGS: of "crv" - compact, robust - and "v" for verbose errors
+ *     embree LIBRARY SCENE RAYS HITS [FLAGS]      FLAGS: of "cr" - compact, robust
  *
  * LIBRARY is opened at run time (libembree3.so.3, or pip embreex's libembree4); rtcore.h of 3.13 gives the types.
  * The two differ in how a ray is handed over and in fields at the end of a hit, for which room is left.
@@ -8,7 +8,8 @@
  * u32 instances; each u32 group, 12 floats (3x4, row by row). Without instances all groups are the scene.
  * RAYS: u32 sets; each u32 rays, u32 coherent, floats ox oy oz dx dy dz. Directions must have unit length: cone curves give
  * wrong hits otherwise, and so instances must not scale. HITS: t of every ray of every set, as floats.
- * Output: JSON; rates are millions of rays a second, each the median of REPEATS. */
+ * It takes turns (turns.py): each line of standard input is the number of a set of rays, which is traced as packets and ray by
+ * ray, and answered by a line of JSON with the rates, millions of rays a second. After the last turn comes a line about all. */
 #include <dlfcn.h>
 #include <embree3/rtcore.h>
 #include <stdio.h>
@@ -229,32 +230,36 @@ static void single(RTCScene scene, set *s, struct RTCIntersectContext *context)
 PACKETS(packets8, hit8, 8, many8)
 PACKETS(packets16, hit16, 16, many16)
 
-static int by_value(const void *a, const void *b)
-{
-    return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
-}
-
+/* The rate of a set, as a member of a JSON object. */
 static void measure(const char *name, void (*run)(RTCScene, set *, struct RTCIntersectContext *), RTCScene scene, set *s,
-                    int repeats)
+                    const char *end)
 {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     if (s->coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     arguments4.flags = s->coherent ? 1u << 16 : 0; /* RTC_RAY_QUERY_FLAG_COHERENT */
-    double *rates = malloc(sizeof *rates * (size_t)repeats);
-    for (int i = 0; i < repeats; i++) {
-        double start = now();
-        run(scene, s, &context);
-        rates[i] = 1e-6 * s->count / (now() - start);
+    double start = now();
+    run(scene, s, &context);
+    printf("\"%s\": %.4f%s", name, 1e-6 * s->count / (now() - start), end);
+}
+
+/* A turn for each line of standard input. */
+static void take_turns(RTCScene scene, set *sets, unsigned count)
+{
+    unsigned number;
+    while (scanf("%u", &number) == 1) {
+        if (number >= count) fail("no such set of rays");
+        printf("{");
+        measure("packets8", packets8, scene, &sets[number], ", ");
+        measure("packets16", packets16, scene, &sets[number], ", ");
+        measure("single", single, scene, &sets[number], "}\n");
+        fflush(stdout);
     }
-    qsort(rates, (size_t)repeats, sizeof *rates, by_value);
-    printf(", \"%s\": [%.4f, %.4f, %.4f]", name, rates[0], rates[repeats / 2], rates[repeats - 1]);
-    free(rates);
 }
 
 int main(int argc, char **argv)
 {
-    if (argc < 6) fail("embree LIBRARY SCENE RAYS REPEATS FLAGS [HITS]");
+    if (argc < 5) fail("embree LIBRARY SCENE RAYS HITS [FLAGS]");
     open_library(argv[1]);
     RTCDevice device = p_rtcNewDevice("threads=1,set_affinity=0");
     if (!device) fail("no device");
@@ -262,28 +267,17 @@ int main(int argc, char **argv)
     version = (int)(number / 10000);
     p_rtcSetDeviceMemoryMonitorFunction(device, count_bytes, NULL);
     double start = now();
-    RTCScene scene = read_scene(device, argv[2], argv[5]);
+    RTCScene scene = read_scene(device, argv[2], argc > 5 ? argv[5] : "");
     double build = now() - start;
     set *sets;
     unsigned count = read_rays(argv[3], &sets);
-    int repeats = atoi(argv[4]);
-    printf("{\"version\": \"%ld.%ld.%ld\", \"build_seconds\": %.4f, \"bytes\": %lld, \"error\": %d, \"sets\": [",
-           number / 10000, number / 100 % 100, number % 100, build, bytes, p_rtcGetDeviceError(device));
-    for (unsigned i = 0; i < count; i++) {
-        unsigned hits = 0;
-        printf("%s{\"rays\": %u", i ? ", " : "", sets[i].count);
-        measure("packets8", packets8, scene, &sets[i], repeats);
-        measure("packets16", packets16, scene, &sets[i], repeats);
-        measure("single", single, scene, &sets[i], repeats);
-        for (unsigned k = 0; k < sets[i].count; k++) hits += sets[i].t[k] < 1e30f;
-        printf(", \"hits\": %u}", hits);
-    }
-    printf("]}\n");
-    if (argc > 6) {
-        FILE *file = fopen(argv[6], "wb");
-        for (unsigned i = 0; file && i < count; i++) fwrite(sets[i].t, sizeof(float), sets[i].count, file);
-        if (file) fclose(file);
-    }
+    take_turns(scene, sets, count);
+    printf("{\"version\": \"%ld.%ld.%ld\", \"build_seconds\": %.4f, \"bytes\": %lld, \"error\": %d}\n", number / 10000,
+           number / 100 % 100, number % 100, build, bytes, p_rtcGetDeviceError(device));
+    FILE *file = fopen(argv[4], "wb");
+    if (!file) fail("the hits can't be written");
+    for (unsigned i = 0; i < count; i++) fwrite(sets[i].t, sizeof(float), sets[i].count, file);
+    fclose(file);
     p_rtcReleaseScene(scene);
     p_rtcReleaseDevice(device);
     return 0;

@@ -4,33 +4,27 @@ from __future__ import annotations
 
 import os
 
-from common import ALL, SETS, Bench, median, rate
-from peers import ours
+from common import ALL, SETS, Bench, median, rate, ratios
 from prepare import Case
 from report import size
+from turns import alone, ours, take_turns
 
 
 def scatter(bench: Bench) -> None:
     """The paper's 2.3: its grid over its boxes, on spheres scattered by translations."""
     case = Case("scatter", "scatter", {}, bench.folder)
-    boxes = [ours(case, options={"accelerator": "boxes"}, repeats=1) for _ in range(bench.rounds)]
-    for sides, paper in (((16, 16, 8), " (paper: 2.3)"), ((64, 64, 4), "")):
-        grid = [
-            ours(case, options={"accelerator": "grid", "grid": sides}, repeats=1) for _ in range(bench.rounds)
-        ]
+    others = {
+        "grid 16x16x8 of boxes (paper: 2.3)": ours(case, options={"accelerator": "grid", "grid": (16, 16, 8)}),
+        "grid 64x64x4 of boxes": ours(case, options={"accelerator": "grid", "grid": (64, 64, 4)}),
+        "bvh of boxes": ours(case),
+    }
+    boxes, *answers = take_turns([ours(case, options={"accelerator": "boxes"}), *others.values()], bench.rounds)
+    for what, answer in zip(others, answers):
         for name in SETS:
             bench.results.row(
-                case.name, f"{name}: grid {'x'.join(map(str, sides))} of boxes{paper}", [rate(g, name) / rate(b, name) for g, b in zip(grid, boxes)],
-                ours=f"{rate(grid[0], name):.4f} Mray/s, {size(grid[0]['scene_bytes'])}", theirs=f"{rate(boxes[0], name):.4f}, {size(boxes[0]['scene_bytes'])}",
+                case.name, f"{name}: {what}", ratios(answer, boxes, name),
+                ours=f"{rate(answer, name):.4f} Mray/s, {size(answer['scene_bytes'])}", theirs=f"{rate(boxes, name):.4f}, {size(boxes['scene_bytes'])}",
             )  # fmt: skip
-    bvh = ours(case)
-    for name in SETS:
-        bench.results.row(
-            case.name,
-            f"{name}: bvh of boxes",
-            rate(bvh, name) / rate(boxes[0], name),
-            ours=f"{rate(bvh, name):.2f} Mray/s",
-        )
 
 
 def threads(bench: Bench) -> None:
@@ -41,21 +35,15 @@ def threads(bench: Bench) -> None:
         ("Menger 6", "menger", {"level": 6}),
     ):
         case = Case(name, scene, parameters, bench.folder)
-        points = []
-        for count in range(1, cores + 1):
-            answers = [ours(case, pinned=False, threads=count, wall=True) for _ in range(bench.rounds)]
-            points.append(
-                {
-                    "threads": count,
-                    "rate": median([rate(a, "coherent") for a in answers]),
-                    "all": [rate(a, "coherent") for a in answers],
-                }
-            )
-        bench.results.curves[f"threads: {name}"] = points
+        programs = [
+            ours(case, pinned=False, threads=count, wall=True) for count in range(1, cores + 1)
+        ]
+        answers = take_turns(programs, 3 * bench.rounds)
+        bench.results.curves[f"threads: {name}"] = [
+            {"threads": count, "rate": rate(answer, "coherent")} for count, answer in enumerate(answers, 1)
+        ]
         if cores > 1:
-            bench.results.row(
-                name, "2 threads of 1", [b / a for a, b in zip(points[0]["all"], points[1]["all"])], 1.9
-            )
+            bench.results.row(name, "2 threads of 1", ratios(answers[1], answers[0], "coherent"), 1.9)
 
 
 def fronts(bench: Bench) -> None:
@@ -69,10 +57,7 @@ def fronts(bench: Bench) -> None:
         for items in (
             (1, 21, 256, 2048, ALL) if bench.quick else (1, 5, 21, 64, 256, 1024, 2048, 8192, 65536, ALL)
         ):
-            answer = ours(case, options={"front_items": items}, repeats=3)
-            if "failed" in answer:
-                bench.results.note(name, f"fronts of {items} items: {answer['failed']}")
-                continue
+            answer = alone(ours(case, options={"front_items": items}))
             points.append(
                 {"items": items, "bytes": answer["scene_bytes"], "build_seconds": answer["build_seconds"]}
                 | {n: rate(answer, n) for n in SETS}
@@ -89,10 +74,7 @@ def growth(bench: Bench) -> None:
     """Menger 2 to 10: 400 to 1e13 primitives."""
     points = []
     for level in range(2, 11):
-        answer = ours(Case(f"Menger {level}", "menger", {"level": level}, bench.folder), repeats=1)
-        if "failed" in answer:
-            bench.results.note(f"Menger {level}", f"failed: {answer['failed']}")
-            continue
+        answer = alone(ours(Case(f"Menger {level}", "menger", {"level": level}, bench.folder)), 1)
         points.append(
             {
                 "primitives": 20.0**level,

@@ -21,8 +21,6 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-
 HERE = Path(__file__).resolve().parent
 MISSING: dict[str, str] = {}
 PINNED = ("taskset", "-c", str(max(os.sched_getaffinity(0))))
@@ -45,12 +43,17 @@ def launcher() -> subprocess.Popen:
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
-def run(command: list, request: object = None, pinned: bool = True, folder: Path | None = None) -> Run:
-    """Runs a program to its end. RuntimeError with its last words if it fails."""
-    prefix = PINNED if pinned and shutil.which("taskset") else ()
+def on_one_core(pinned: bool) -> tuple[str, ...]:
+    """What a pinned command begins with."""
+    return PINNED if pinned and shutil.which("taskset") else ()
+
+
+def run(command: list, text: str = "", pinned: bool = True, folder: Path | None = None) -> Run:
+    """Runs a program, which reads a text, to its end. RuntimeError with its last words if it fails."""
+    prefix = on_one_core(pinned)
     with tempfile.TemporaryDirectory() as place:
         given, said, complained = (Path(place) / name for name in ("in", "out", "err"))
-        given.write_text("" if request is None else json.dumps(request))
+        given.write_text(text)
         order = {
             "command": [*prefix, *map(str, command)],
             "stdin": str(given),
@@ -75,22 +78,11 @@ def plsys(*arguments: object, pinned: bool = False) -> Run:
     return run([*command, *arguments], pinned=pinned)
 
 
-def ours(case, pinned: bool = True, **request) -> dict:
-    """work.py's answer for a case; a failure is {"failed": why}."""
-    request = {"scene": str(case.path), "parameters": case.parameters, "rays": str(case.rays_path), "repeats": 3,
-               "most_seconds": 2.0, "options": {}} | request  # fmt: skip
-    try:
-        done = run([sys.executable, HERE / "work.py"], request, pinned=pinned)
-    except RuntimeError as error:
-        return {"failed": str(error).strip().splitlines()[-1][:200]}
-    return json.loads(done.text) | {"process_rss": done.rss}
-
-
 # --- Embree ---
 
 
 @cache
-def embree_program(folder: Path) -> Path | None:
+def embree_compiled(folder: Path) -> Path | None:
     program = folder / "embree"
     compiler = shutil.which("cc")
     done = compiler and subprocess.run(
@@ -120,23 +112,6 @@ def embree_libraries() -> dict[str, str]:
     if "4.4" not in found:
         MISSING["embree 4.4"] = "pip install embreex"
     return found
-
-
-def embree(
-    case, scene: Path, folder: Path, version: str = "3.13", flags: str = "-", repeats: int = 3
-) -> dict | None:
-    """embree.c's answer, with t of all rays under "t", by set."""
-    program, library = embree_program(folder), embree_libraries().get(version)
-    if not program or not library:
-        return None
-    hits = folder / "embree-hits.bin"
-    done = run([program, library, scene, case.binary_rays_path, repeats, flags, hits])
-    answer = json.loads(done.text)
-    answer["sets"] = dict(zip(case.rays, answer["sets"]))
-    t, counts = np.fromfile(hits, np.float32).astype(float), [len(rays) for rays in case.rays.values()]
-    t[t > 1e29] = np.inf
-    answer["t"] = dict(zip(case.rays, np.split(t, np.cumsum(counts)[:-1])))
-    return answer | {"process_rss": done.rss}
 
 
 # --- POV-Ray ---

@@ -12,6 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import peer_mitsuba as mitsuba
 import peers
+import turns
 from prepare import (
     CURVES,
     QUADS,
@@ -91,32 +92,47 @@ def test_the_forest_split_by_hand_is_the_forest(tmp_path):
 
 
 def test_embree_answers_like_us(tmp_path):
-    if not peers.embree_program(tmp_path) or "3.13" not in peers.embree_libraries():
+    if not peers.embree_compiled(tmp_path) or "3.13" not in peers.embree_libraries():
         pytest.skip("libembree-dev isn't installed")
     for case, group in (
         (Case("tree", "tree", {"order": 4}, tmp_path, size=(32, 24)), lambda m: (CURVES, cone_curves(m))),
         (Case("sponge", "menger", {"level": 2}, tmp_path, size=(32, 24)), lambda m: (QUADS, box_quads(m))),
     ):
         scene = write_embree(tmp_path / "scene.bin", [group(case.unfolded()[1])], [])
-        answer = peers.embree(case, scene, tmp_path, repeats=1)
+        answer, mine = turns.take_turns([turns.embree(case, scene), turns.ours(case)], 2)
         for name, rays in case.rays.items():
             with Scene(case.compilation.encode()) as traced:
                 t = traced.intersect(rays[:, :3].astype(float), rays[:, 3:].astype(float)).t
             theirs = answer["t"][name]
             same = np.isclose(t, theirs, rtol=1e-3) | (np.isinf(t) & np.isinf(theirs))
             assert same.mean() > 0.98  # its curves have no caps
-            assert answer["sets"][name]["rays"] == len(rays) and np.isfinite(theirs).any()
+            assert np.isfinite(theirs).any()
+            measured = answer["sets"][name]["single"], mine["sets"][name]["rates"]
+            assert all(len(rates) == 2 and min(rates) > 0 for rates in measured)  # a rate a turn
 
 
 def test_our_own_child_process_measures_and_counts(tmp_path):
     case = Case("tree", "tree", {"order": 3}, tmp_path, size=(16, 12))
-    answer = peers.ours(case, options={"accelerator": "grid", "grid": [4, 4, 4]}, repeats=2)
+    answer = turns.alone(turns.ours(case, options={"accelerator": "grid", "grid": [4, 4, 4]}), 2)
     with Scene(case.compilation.encode()) as traced:
         rays = case.rays["coherent"].astype(float)
         hits = np.isfinite(traced.intersect(rays[:, :3], rays[:, 3:]).t).sum()
     assert answer["sets"]["coherent"]["hits"] == hits and answer["primitives"] == 17
-    assert answer["sets"]["random"]["rates"][0] > 0
-    assert "failed" in peers.ours(case, options={"accelerator": "kd"})
+    assert answer["process_rss"] > 1e6 and all(rate > 0 for rate in answer["sets"]["random"]["rates"])
+
+
+def test_a_program_that_fails_says_why(tmp_path):
+    case = Case("tree", "tree", {"order": 3}, tmp_path, size=(16, 12))
+    programs = [turns.ours(case), turns.ours(case, options={"accelerator": "kd"})]
+    for run in (lambda: turns.alone(programs[1]), lambda: turns.take_turns(programs)):
+        with pytest.raises(RuntimeError, match="'kd' is none of"):
+            run()
+
+
+def test_slow_programs_trace_some_of_the_rays(tmp_path):
+    case = Case("tree", "tree", {"order": 3}, tmp_path, size=(64, 48))
+    answer = turns.alone(turns.ours(case, most_seconds=0), 1)
+    assert answer["sets"]["coherent"]["rays"] == 512 < len(case.rays["coherent"])
 
 
 def test_a_process_is_measured_alone():

@@ -10,9 +10,10 @@ from pathlib import Path
 import peer_mitsuba as mitsuba
 import peers
 from common import Bench, curves_of, median, pixels_traced
-from peers import ours, plsys
+from peers import plsys
 from prepare import Case, box_quads, split_forest, split_tree
 from report import size
+from turns import alone, ours
 
 ONE_SPHERE = (
     "camera { location <0, 0, -5> look_at 0 }\nlight_source { <9, 9, -9> color rgb 1 }\n"
@@ -76,10 +77,8 @@ def unique(bench: Bench) -> None:
     for what, detail, picture in (("at --detail 1", 1.0, [640, 480]), ("without cut-off", 0.0, [160, 120])):
         if bench.quick and not detail:
             continue
-        answer = ours(case, options={"detail": detail, "memory": 200 * 2**20}, pictures=2, size=picture)
-        if "failed" in answer:
-            bench.results.note(case.name, f"{what}: {answer['failed']}")
-            continue
+        options = {"detail": detail, "memory": 200 * 2**20}
+        answer = alone(ours(case, sets=False, options=options, pictures=2, size=picture))
         cold, warm = answer["pictures"]
         lazy = answer["lazy"]
         bench.results.note(

@@ -1,10 +1,12 @@
-"""Measures plsys on given rays, as a process of its own: a JSON request on standard input, a JSON answer on standard output.
+"""Measures plsys on given rays, as a process of its own that takes turns (turns.py): a JSON request in the first line.
 
-    {"scene": "tree.plsys", "parameters": {"order": 10}, "rays": "rays.npz", "repeats": 3, "options": {"accelerator": "bvh"}}
-    → {"sets": {"coherent": {"rates": [min, median, max], "hits": 512, "seconds": …}}, "scene_bytes": …, "build_seconds": …}
+    {"scene": "tree.plsys", "parameters": {"order": 10}, "rays": "rays.npz", "options": {"accelerator": "bvh"}}
+    0                                               traces the first set of rays
+    → {"rates": 12.3}
+    → {"sets": {"coherent": {"rays": 307200, "hits": 512}}, "scene_bytes": …, "build_seconds": …}     after the last turn
 
 Only t is asked for, as of the peers. Rates are millions of rays a second, of CPU time or, with "wall": true, of the clock on
-the wall. A set is cut off after `most_seconds`: slow accelerators trace its first rays only.
+the wall. Of a set that takes longer than `most_seconds` some rays are traced, evenly spread.
 
     {…, "pictures": 2, "size": [640, 480]} → {"pictures": [0.9, 0.4], …}       seconds of drawing the scene again and again
 """
@@ -13,7 +15,6 @@ from __future__ import annotations
 
 import ctypes
 import json
-import resource
 import sys
 import time
 from collections.abc import Callable
@@ -42,26 +43,32 @@ def intersect(scene: Scene, origins: np.ndarray, directions: np.ndarray, t: np.n
     return seconds
 
 
-def measure(scene: Scene, rays: np.ndarray, repeats: int, most_seconds: float, clock: Clock) -> dict:
-    origins, directions = (
-        np.ascontiguousarray(rays[:, part], np.float64) for part in (slice(0, 3), slice(3, 6))
-    )
-    t = np.empty(len(rays))
+class RaySet:
+    """Rays as the runtime takes them, and t of their foremost hits."""
+
+    def __init__(self, scene: Scene, rays: np.ndarray, clock: Clock):
+        self.scene, self.clock = scene, clock
+        self.origins, self.directions = (
+            np.ascontiguousarray(rays[:, part], np.float64) for part in (slice(0, 3), slice(3, 6))
+        )
+        self.t = np.empty(len(rays))
+
+    def seconds(self) -> float:
+        return intersect(self.scene, self.origins, self.directions, self.t, self.clock)
+
+    def rate(self) -> float:
+        return 1e-6 * len(self.t) / self.seconds()
+
+
+def affordable(scene: Scene, rays: np.ndarray, most_seconds: float, clock: Clock) -> RaySet:
+    """The rays, or as many of them, evenly spread, as take so long."""
     few = min(len(rays), 512)
-    spread = np.linspace(0, len(rays) - 1, few).astype(int)
-    seconds = intersect(scene, origins[spread].copy(), directions[spread].copy(), np.empty(few), clock)
-    count = len(rays)
-    if seconds / few * len(rays) > most_seconds:
-        count = max(few, int(most_seconds / seconds * few))
-        chosen = np.linspace(0, len(rays) - 1, count).astype(int)
-        origins, directions, t = origins[chosen].copy(), directions[chosen].copy(), t[:count]
-    rates = sorted(1e-6 * count / intersect(scene, origins, directions, t, clock) for _ in range(repeats))
-    return {
-        "rays": count,
-        "rates": [rates[0], rates[len(rates) // 2], rates[-1]],
-        "hits": int(np.isfinite(t).sum()),
-        "t": t.tolist() if count == len(rays) and count <= 4096 else None,
-    }
+    count = int(most_seconds * few / max(RaySet(scene, spread(rays, few), clock).seconds(), 1e-9))
+    return RaySet(scene, spread(rays, max(count, few)), clock)
+
+
+def spread(rays: np.ndarray, count: int) -> np.ndarray:
+    return rays if count >= len(rays) else rays[np.linspace(0, len(rays) - 1, count).astype(int)]
 
 
 def draw(scene: Scene, size: tuple[int, int], times: int, clock: Clock) -> list[float]:
@@ -75,36 +82,36 @@ def draw(scene: Scene, size: tuple[int, int], times: int, clock: Clock) -> list[
 
 
 def main() -> None:
-    request = json.load(sys.stdin)
+    request = json.loads(sys.stdin.readline())
     compilation = build(Source.read(request["scene"]), parameters=request["parameters"])
     data = compilation.encode()
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     options = dict(request["options"])
     clock = time.perf_counter if request.get("wall") else time.process_time
     start = clock()
     with Scene(data, threads=request.get("threads", 1), **options) as scene:
         build_seconds = clock() - start
-        answer: dict = {"build_seconds": build_seconds, "sets": {}}
+        answer: dict = {"build_seconds": build_seconds}
         if request.get("pictures"):
             answer["pictures"] = draw(scene, request["size"], request["pictures"], clock)
-        with np.load(request["rays"]) as sets:
-            for name in () if request.get("pictures") else request.get("sets") or sets.files:
-                answer["sets"][name] = measure(scene, sets[name], request["repeats"], request["most_seconds"], clock)
+        with np.load(request["rays"]) as loaded:
+            rays = dict(loaded)
+        sets: dict[str, RaySet] = {}
+        for line in sys.stdin:
+            name = list(rays)[int(line)]
+            if name not in sets:
+                sets[name] = affordable(scene, rays[name], request["most_seconds"], clock)
+            print(json.dumps({"rates": sets[name].rate()}), flush=True)
+        answer["sets"] = {
+            name: {"rays": len(s.t), "hits": int(np.isfinite(s.t).sum())} for name, s in sets.items()
+        }
         if request.get("hits"):
-            t = {}
-            with np.load(request["rays"]) as sets:
-                for name in sets.files:
-                    rays = sets[name].astype(np.float64)
-                    t[name] = np.empty(len(rays))
-                    intersect(scene, rays[:, :3].copy(), rays[:, 3:].copy(), t[name])
-            np.savez(request["hits"], **t)
+            np.savez(request["hits"], **{name: s.t for name, s in sets.items()})
         statistics = scene.statistics
     answer |= {
         name: statistics[name]
-        for name in ("scene_bytes", "primitives", "states", "box_tests", "primitive_tests", "lazy", "rays", "front")
+        for name in ("scene_bytes", "primitives", "lazy")
     }
-    answer["rss_growth"] = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024
-    json.dump(answer, sys.stdout)
+    print(json.dumps(answer))
 
 
 if __name__ == "__main__":
