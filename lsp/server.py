@@ -25,6 +25,7 @@ logger = logging.getLogger(__name__)
 
 _LENGTH = re.compile(rb"content-length:\s*(\d+)\s*$", re.IGNORECASE)
 MAX_MESSAGE_BYTES = 1 << 30
+_ENCODER = json.JSONEncoder(separators=(",", ":"), check_circular=False)  # no message holds itself
 
 # Edits leave no garbage in cycles (facts.drop_facts), and searching a large file for it takes a tenth of a second. So it is
 # looked for after so many new objects only, and what there is by then, in each pause or after fewer, is taken out of the search.
@@ -171,7 +172,7 @@ class Dispatcher:
 
     def send(self, message: dict) -> None:
         try:
-            self.write(json.dumps(message, separators=(",", ":")).encode())
+            self.write(_ENCODER.encode(message).encode())
         except (ConnectionError, ValueError):  # the client is gone
             self.leave()
 

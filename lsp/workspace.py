@@ -216,10 +216,11 @@ class Workspace:
         }
         if found.code in UNNECESSARY:
             result["tags"] = [1]
-        places = [(scene.place(note.span), note.message) for note in found.notes]
-        related = [{"location": self.location(place), "message": said} for place, said in places if place is not None]
-        if related:
-            result["relatedInformation"] = related
+        if found.notes:
+            places = [(scene.place(note.span), note.message) for note in found.notes]
+            related = [{"location": self.location(place), "message": said} for place, said in places if place is not None]
+            if related:
+                result["relatedInformation"] = related
         return result
 
 

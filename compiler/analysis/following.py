@@ -60,6 +60,10 @@ class Following:
         self._edited: dict[Block, list[Span] | None] = {}
         self._dirty: dict[Block, list[Span] | None] = {}  # then those that use what was edited
         self._opened: dict[Block, None] = {}  # and then those of a file that was opened, from its start
+        self._by_block = (
+            self._messages, self._syntax, self.whole, self.general, self.insights, self._ignoring,
+            self._edited, self._dirty, self._opened, *self.singles.values(),
+        )  # fmt: skip
         self._resolver = BlockResolver(Router(self._messages), self.entries, names.nearest)
 
     def _find_files(self) -> None:
@@ -144,12 +148,14 @@ class Following:
         is_kept = self._is_alone() and change.removed and not any([facts_of(block).ghosts for block in change.added])
         removed_includes = False
         for block in change.removed:
+            facts = facts_of(block)
             if is_kept:
-                self._note_right(block)
+                if self._is_right(block, facts):
+                    self._note_right(block, facts)
                 self._earlier.keep(block)
             self._forget(block)
-            self._names.forget(facts_of(block))
-            removed_includes |= b"include" in block.data and bool(facts_of(block).includes)
+            self._names.forget(facts)
+            removed_includes |= b"include" in block.data and bool(facts.includes)
             if (readers := block.__dict__.get("readers", 1)) > 1:
                 block.__dict__["readers"] = readers - 1  # another scene has yet to forget the same facts
             else:
@@ -157,11 +163,12 @@ class Following:
             yield
         waiting = self._opened if len(change.added) >= MANY_BLOCKS else self._edited
         for block in change.added:
-            self._learn(block)
-            self._names.learn(facts_of(block))
+            facts = facts_of(block)
+            self._learn(block, facts)
+            self._names.learn(facts)
             if waiting is self._opened:
                 role_of(block)  # the whole-file checks ask for it, of all blocks at once
-            if not self._is_right(block):
+            if not self._was_right(block, facts):
                 waiting[block] = None
             yield
         if removed_includes or any(facts_of(block).includes for block in change.added if b"include" in block.data):
@@ -186,10 +193,11 @@ class Following:
     def _is_right_but_at(self, block: Block, places: list[Span]) -> bool:
         """Whether nothing is known to be wrong with ``block`` but what is in ``places``. (Of a second definition nothing is
         known but that it is one.)"""
-        return all(
+        said = self._messages.get(block)
+        return not said or all(
             each.code != "duplicate-name"
             and any(place.start <= each.span.start and each.span.end <= place.end for place in places)
-            for each in self._messages.get(block, ())
+            for each in said
         )
 
     def _retouch(self, change: Change) -> bool:
@@ -205,7 +213,8 @@ class Following:
         name = leaf.name if isinstance(leaf, syntax.Name) else None
         # Whether all else in the block is known to be right.
         was_right = not was_broken and not self._is_waiting(old) and self._is_right_but_at(old, places)
-        self._note_right(old)
+        if was_right and not self._messages.get(old):
+            self._note_right(old, facts)
         self._forget(old)
         if touch.renames and touch.index is None:
             names.forget(facts)
@@ -221,39 +230,37 @@ class Following:
                 names.learn_uses(facts, words)
             elif leaf is not None:
                 names.learn_value(facts, facts.is_broken is not was_broken)
-        self._learn(new)
-        if not (was_right and leaf is None) and not self._is_right(new):
+        self._learn(new, facts)
+        if not (was_right and leaf is None) and not self._was_right(new, facts):
             self._edited[new] = places if was_right else None
         return True
 
-    def _note_right(self, block: Block) -> None:
-        """Note with the facts of a block that goes if all in it is known to be right."""
-        if not (self._is_waiting(block) or self._messages.get(block) or facts_of(block).is_broken):
-            right = facts_of(block).right
-            right.pop(block.data, None)
-            right[block.data] = self._names.now
-            if len(right) > RIGHT_TEXTS:
-                del right[next(iter(right))]
+    def _is_right(self, block: Block, facts: Facts) -> bool:
+        """Whether all in a block is known to be right."""
+        return not (self._messages.get(block) or facts.is_broken or self._is_waiting(block))
+
+    def _note_right(self, block: Block, facts: Facts) -> None:
+        """Note with the facts of a block that goes that all in it was right."""
+        right = facts.right
+        right.pop(block.data, None)
+        right[block.data] = self._names.now
+        if len(right) > RIGHT_TEXTS:
+            del right[next(iter(right))]
 
     def _is_waiting(self, block: Block) -> bool:
         """Whether a block is to be resolved."""
         return block in self._edited or block in self._dirty or block in self._opened
 
-    def _is_right(self, block: Block) -> bool:
+    def _was_right(self, block: Block, facts: Facts) -> bool:
         """Whether an earlier block with the same text was right, and all names in it mean the same."""
-        facts = facts_of(block)
         moment = facts.right.get(block.data)
         return moment is not None and self._names.are_as(facts, moment)
 
     def _forget(self, block: Block) -> None:
-        waiting = self._edited, self._dirty, self._opened
-        for table in (self._messages, self._syntax, self.whole, self.general, self.insights, self._ignoring, *waiting):
+        for table in self._by_block:
             table.pop(block, None)
-        for single in self.singles.values():
-            single.pop(block, None)
 
-    def _learn(self, block: Block) -> None:
-        facts = facts_of(block)
+    def _learn(self, block: Block, facts: Facts) -> None:
         block.__dict__["readers"] = block.__dict__.get("readers", 0) + 1
         if facts.syntax:
             self._syntax[block] = facts.syntax

@@ -8,15 +8,18 @@ Example: ``{A → B}`` and then ``{B → C}`` is ``{A → C}``.
 
 from __future__ import annotations
 
+from typing import Iterable
+
 from .text import Block, Change
 
 
 class _Joined:
     """Changes as one: what was there before all of them, and what is after."""
 
-    def __init__(self) -> None:
-        self.removed: dict[Block, None] = {}
-        self.added: dict[Block, None] = {}
+    __slots__ = "removed", "added"
+
+    def __init__(self, removed: Iterable[Block] = (), added: Iterable[Block] = ()) -> None:
+        self.removed, self.added = dict.fromkeys(removed), dict.fromkeys(added)
 
 
 class Pending:
@@ -29,6 +32,10 @@ class Pending:
 
     def add(self, change: Change) -> None:
         of = self._of
+        if len(change.removed) == len(change.added) == 1 and change.removed[0] not in of:  # most are such
+            joined = of[change.added[0]] = _Joined(*change)
+            self._changes[joined] = None
+            return
         touched = list(dict.fromkeys([of[block] for block in change.removed if block in of]))
         # A file that is being opened is one large change: the others go into it.
         joined = max(touched, key=lambda each: len(each.added), default=None) or _Joined()
@@ -38,14 +45,14 @@ class Pending:
                 del self._changes[other]
                 joined.removed.update(other.removed)
                 joined.added.update(other.added)
-                self._of.update(dict.fromkeys(other.added, joined))
+                of.update(dict.fromkeys(other.added, joined))
         for block in change.removed:
             if block in joined.added:
-                del joined.added[block], self._of[block]
+                del joined.added[block], of[block]
             else:
                 joined.removed[block] = None
         joined.added.update(dict.fromkeys(change.added))
-        self._of.update(dict.fromkeys(change.added, joined))
+        of.update(dict.fromkeys(change.added, joined))
 
     def take(self) -> list[Change]:
         """All changes, the oldest first, which are pending no longer."""

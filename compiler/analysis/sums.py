@@ -56,10 +56,10 @@ class Sums:
         self._gap = low + len(new) - 1
         self._shift += new[-1] - after
 
-    def resize(self, index: int, size: int) -> None:
-        """Piece ``index`` has become as long as ``size``."""
+    def grow(self, index: int, by: int) -> None:
+        """Piece ``index`` has become longer ``by`` so much."""
         self._move(index)
-        self._shift += size - (self[index + 1] - self[index])
+        self._shift += by
 
     def _move(self, index: int) -> None:
         gap, shift = self._gap, self._shift

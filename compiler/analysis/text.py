@@ -213,8 +213,8 @@ class Text:
         if shape.depth or shape.comment or not low or not _PLAIN.fullmatch(data) or not _AMID_PLAIN.fullmatch(old, low - 1, high + 1):
             return None
         # Whether the next block starts where it does is seen at the end of this one.
-        has_comments = b"//" in old or b"/*" in old
-        end = _CODE_END.search(old).start() if has_comments else len(old.rstrip()) - 1  # type: ignore[union-attr]
+        may_have_comments = b"/" in old
+        end = _CODE_END.search(old).start() if may_have_comments else len(old.rstrip()) - 1  # type: ignore[union-attr]
         if high > end or old[end] not in b"};":
             return None
         new = old[:low] + data + old[high:]
@@ -232,7 +232,7 @@ class Text:
         if (starts := block.__dict__.get("line_starts")) is not None:
             behind, by = bisect_right(starts, low), len(new) - len(old)
             change.added[0].__dict__["line_starts"] = starts[:behind] + [each + by for each in starts[behind:]]
-        _link(change, low, high, len(data))
+        _link(block, change.added[0], low, high, len(data))
         return change
 
     def _swap(self, index: int, data: bytes) -> Change:
@@ -242,7 +242,7 @@ class Text:
         new.__dict__["has_head_lines"] = old.has_head_lines
         old.__dict__["is_gone"] = True
         if len(data) != len(old.data):
-            self._starts.resize(index, len(data))
+            self._starts.grow(index, len(data) - len(old.data))
         if self._order is not None:
             self._order[new] = self._order.pop(old)
         return Change([old], [new])
@@ -276,7 +276,7 @@ class Text:
         change, head = self._exchange(low, high, [(new[piece.start : piece.end], piece.shape) for piece in joined])
         if len(change.removed) == len(change.added) == 1:
             base = self._starts[low + head]
-            _link(change, start - base, end - base, len(data))
+            _link(change.removed[0], change.added[0], start - base, end - base, len(data))
         return change
 
     def _loose_before(self, low: int) -> int:
@@ -335,9 +335,8 @@ class Text:
         return joined, 0
 
 
-def _link(change: Change, start: int, end: int, length: int) -> None:
-    """Remember how the one removed block became the one added: by ``length`` bytes in the place of start to end."""
-    (old,), (new,) = change
+def _link(old: Block, new: Block, start: int, end: int, length: int) -> None:
+    """Remember how one block became the other: by ``length`` bytes in the place of start to end."""
     if 0 <= start and end <= len(old.data):
         new.__dict__["before"] = (old, (start, end, start + length))
     old.__dict__.update(after=new, before=None)  # one step of history is enough

@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cache
+from typing import Iterator
 
 from .codes import CODES
 from .diagnostics import Diagnostic, Diagnostics
@@ -106,8 +107,22 @@ def _mask(match: re.Match[bytes]) -> bytes:
 
 
 @cache
-def _habits_in(context: str) -> tuple[Habit, ...]:
-    return tuple(habit for habit in HABITS if context in habit.where)
+def _habits_in(context: str) -> tuple[dict[int, Habit], frozenset[int], dict[str, list[int]]]:
+    """The habits of a context by their numbers, those that need no text, and which need each."""
+    habits = {number: habit for number, habit in enumerate(HABITS) if context in habit.where}
+    needing: dict[str, list[int]] = {}
+    for number, habit in habits.items():
+        for need in habit.needs:
+            needing.setdefault(need, []).append(number)
+    return habits, frozenset(number for number, habit in habits.items() if not habit.needs), needing
+
+
+def _habits_for(context: str, line: str) -> Iterator[Habit]:
+    """The habits that ``line`` may show, in the table's order."""
+    habits, always, needing = _habits_in(context)
+    found = [number for need, numbers in needing.items() if need in line for number in numbers]
+    for number in sorted(always.union(found)):
+        yield habits[number]
 
 
 def _habit_at(text: _Text, item: Diagnostic) -> tuple[Diagnostic, tuple[int, int]] | None:
@@ -120,10 +135,7 @@ def _habit_at(text: _Text, item: Diagnostic) -> tuple[Diagnostic, tuple[int, int
         mend = f"floor({found[2]}/{found[3]})"
         message = Diagnostic("syntax", "error", "'//' starts a comment", span, f"write {mend}", mend=mend)
         return message, (low, high)
-    occurs = line.__contains__
-    for habit in _habits_in(context):
-        if habit.needs and not any(map(occurs, habit.needs)):
-            continue
+    for habit in _habits_for(context, line):
         for match in habit.pattern.finditer(text.masked, low, high):
             if match.start() <= offset <= match.end():
                 end = text.masked.find(";", match.end() - 1, high)

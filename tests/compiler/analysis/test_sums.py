@@ -36,7 +36,7 @@ def test_pieces_that_become_longer_or_shorter(sizes, changes):
     sums.exchange(0, 0, sizes)
     for at, size in changes:
         at %= len(sizes)
-        sums.resize(at, size)
+        sums.grow(at, size - sizes[at])
         sizes[at] = size
         expected = list(accumulate(sizes, initial=0))
         assert [sums[i] for i in range(len(expected))] == expected
