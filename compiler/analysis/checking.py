@@ -70,6 +70,7 @@ class SceneState:
     unsure: set[Part] = field(default_factory=set)  # told without what isn't sure
     objects: set[Block] = field(default_factory=set)  # blocks that place something
     including: set[Block] = field(default_factory=set)
+    wrong: set[Block] = field(default_factory=set)  # blocks with errors, as far as the server knows
     is_complete: bool = True  # every file that is included was found
 
     def take(self, request: Request) -> None:
@@ -89,6 +90,7 @@ class SceneState:
                     new += old[piece[0] : piece[1]]
                     kept = piece[1]
             removed += old[kept:]
+        self.wrong = {self.blocks[file.name][number] for file in request.files for number in file.wrong}
         removed += [block for blocks in before.values() for block in blocks]
         self.objects = self.objects.difference(removed).union(block for block in added if role_of(block).places)
         self.including = self.including.difference(removed).union(block for block in added if role_of(block).includes)
@@ -257,7 +259,10 @@ def _check(scene: SceneState, part: Part, order: dict[Block, int], interruption:
 def _checked(scene: SceneState, part: Part, order: dict[Block, int]) -> Outcome:
     from ..reading.check import check
 
-    blocks = sorted((*part.blocks, *scene.parts.needed(part)), key=order.__getitem__)
+    every = *part.blocks, *scene.parts.needed(part)
+    if not scene.wrong.isdisjoint(every) and not any(b"mesh" in block.data for block in every):
+        return Outcome([], True, None)  # nothing is said while there are errors, but about mesh files
+    blocks = sorted(every, key=order.__getitem__)
     diagnostics, kept = Diagnostics(), part.memory or Kept(None)
     try:
         first = next(iter(scene.blocks.values()))[0]  # the root's: of other files, what nothing uses isn't said

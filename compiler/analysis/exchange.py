@@ -23,11 +23,13 @@ class NewBlock(NamedTuple):
 
 
 class FileText(NamedTuple):
-    """A file of a snapshot in ``pieces``: new blocks, and ranges (start, end) of the last request's blocks."""
+    """A file of a snapshot in ``pieces``: new blocks, and ranges (start, end) of the last request's blocks. ``wrong`` are the
+    numbers of blocks that are known to have errors."""
 
     name: str
     path: Path | None
     pieces: tuple[NewBlock | tuple[int, int], ...]
+    wrong: tuple[int, ...] = ()
 
     @property
     def blocks(self) -> list[NewBlock]:

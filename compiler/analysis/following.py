@@ -114,6 +114,13 @@ class Following:
         read = self._reading is None and not self._pending and self._names.is_fresh
         return read and not (self._edited or self._dirty or self._opened)
 
+    def wrong_blocks(self) -> list[Block]:
+        """The blocks with errors, if all that changes touched has been resolved; before, none is known for sure."""
+        if not self.is_current:
+            return []
+        tables = self._syntax, self._messages
+        return [block for table in tables for block, said in table.items() if any(each.severity == "error" for each in said)]
+
     def _steps(self) -> Iterator[None]:
         """Reads what is pending, with a pause after each block. Each kind of work is done for all changes in a row: what it needs
         stays in the processor's caches."""

@@ -37,6 +37,7 @@ class Kept:
     meanings: Meanings | None = field(default_factory=Meanings)  # None: nothing is kept of what was resolved
     answers: Memory = field(default_factory=Memory)
     _resolver: Resolver | None = None
+    _blocks: set[Block] = field(default_factory=set)  # what it has seen
     _gone: set[Block] = field(default_factory=set)  # what the resolver has seen of them doesn't hold
     _due: set[Block] = field(default_factory=set)  # what it has to see instead
     _syntax: dict[Block, list[Diagnostic]] = field(default_factory=dict)
@@ -59,10 +60,11 @@ class Kept:
 
     def resolved(self, blocks: list[Block], root: Block, order: dict[Block, int], found: Diagnostics) -> Model:
         """The model of ``blocks``; messages of reading and resolving them are added to those ``found``."""
-        resolver, gone, due = self._resolver, self._gone, self._due
-        self._resolver, self._gone, self._due = None, set(), set()
+        resolver, gone, due, before, now = self._resolver, self._gone, self._due, self._blocks, set(blocks)
+        self._resolver, self._gone, self._due, self._blocks = None, set(), set(), now
+        due &= now
         try:
-            if resolver is None or not self._exchange(resolver, gone, [block for block in blocks if block in due], order):
+            if resolver is None or (before - gone) | due != now or not self._exchange(resolver, gone, sorted(due, key=order.__getitem__), order):
                 if resolver is not None:
                     resolver.close()
                 resolver = self._resolve(blocks, root)
@@ -78,7 +80,7 @@ class Kept:
                 resolver.close()
 
     def _exchange(self, resolver: Resolver, gone: set[Block], due: list[Block], order: dict[Block, int]) -> bool:
-        names = frozenset().union(*(role_of(block).names for block in due))
+        names = frozenset().union(*(role_of(block).names for blocks in (gone, due) for block in blocks))
         said = resolver.diagnostics.items
         said[:] = [each for each in said if each.span.source not in gone]
         if not resolve_again(resolver, [facts_of(block).file for block in due], gone, names, order):
@@ -127,7 +129,7 @@ def hand_over(before: Iterable[Part], parts: Parts, removed: list[Block], added:
 def _are_exchanged(removed: list[Block], added: list[Block]) -> bool:
     """Whether the scene's blocks are as before but for what stands within definitions."""
     return len(removed) == len(added) and all(
-        role_of(old) == role_of(new)
+        role_of(old)._replace(names=None) == role_of(new)._replace(names=None)
         and not (role_of(old).includes or facts_of(old).blocks or facts_of(new).blocks)
         and [each.name for each in facts_of(old).definitions] == [each.name for each in facts_of(new).definitions]
         for old, new in zip(removed, added)

@@ -202,15 +202,14 @@ class Parts:
                 self._part_of[block] = Part([block])
 
     def _tied(self, block: Block) -> list[Block]:
-        found, queue, names = {block: None}, [block], set()
-        while queue:
-            role = role_of(queue.pop())
-            for name in (role.names | role.defined) - names:
-                names.add(name)
-                if name not in self.shared:
-                    new = [each for each in self.users.get(name, ()) if each not in found and role_of(each).kind == "tied"]
-                    found.update(dict.fromkeys(new))
-                    queue += new
+        found, new, seen = {block: None}, [block], set(self.shared)
+        while new:
+            roles = list(map(role_of, new))
+            names = set().union(*[role.names for role in roles], *[role.defined for role in roles]) - seen
+            seen |= names
+            using = set().union(*[self.users.get(name, ()) for name in names]).difference(found)
+            new = [each for each in using if role_of(each).kind == "tied"]
+            found.update(dict.fromkeys(new))
         return list(found)
 
     def needed(self, part: Part) -> dict[Block, None]:
@@ -222,11 +221,9 @@ class Parts:
 
     def _find_needed(self, part: Part) -> dict[Block, None]:
         found = dict(self.general)
-        queue = [*part.blocks, *found]
-        while queue:
-            for name in role_of(queue.pop()).names:
-                for block in self.shared.get(name, ()):
-                    if block not in found:
-                        found[block] = None
-                        queue.append(block)
+        new = [*part.blocks, *found]
+        while new:
+            names = set().union(*[role_of(block).names for block in new])
+            new = [block for name in names & self.shared.keys() for block in self.shared[name] if block not in found]
+            found.update(dict.fromkeys(new))
         return {block: None for block in found if self._part_of.get(block) is not part}

@@ -50,9 +50,11 @@ class Snapshot:
         blocks = [list(document.text.blocks) for document in scene.documents]
         known = dict(zip([file.name for file in before.request.files], before.blocks)) if before is not None else {}
         files = []
+        wrong = scene.wrong_blocks()
         for document, several in zip(scene.documents, blocks):
-            pieces = _pieces(known.get(document.text.name, []), several)
-            files.append(FileText(document.text.name, document.path, pieces))
+            pieces, order = _pieces(known.get(document.text.name, []), several), document.text.order
+            numbers = tuple(order[block] for block in wrong if block in order)
+            files.append(FileText(document.text.name, document.path, pieces, numbers))
         return cls(scene, blocks, Request(number, scene.number, tuple(files)))
 
 

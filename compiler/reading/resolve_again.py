@@ -30,7 +30,7 @@ def resolve_again(
     forgotten before. False, with nothing changed, where the whole scene has to be resolved. Messages are added to
     the resolver's diagnostics: where there are errors, it can't be used again."""
     nodes = [node for file in files for node in file.definitions]
-    if resolver.model.meshes or not all(_fits(resolver, node) for node in nodes):
+    if not all(_fits(resolver, node) for node in nodes):
         return False
     entries = resolver.names.entries
     for name in names:
@@ -57,10 +57,16 @@ def _fits(resolver: Resolver, node: syntax.Definition) -> bool:
     before: syntax.Definition = entry.node  # type: ignore[assignment]
     if _assigned(node) != _assigned(before):
         return False
+    if resolver.model.meshes and (_may_have_meshes(node) or _may_have_meshes(before)):
+        return False  # files may have changed, and meshes are numbered
     if not isinstance(node, syntax.Selection):
         return True
     is_as_long = sum(map(rule_count, node.productions)) == sum(map(rule_count, before.productions))
     return is_as_long and resolver.terms.edges()[node.name.name] == resolver.terms.ends_of(node)
+
+
+def _may_have_meshes(node: syntax.Definition) -> bool:
+    return "mesh" in node.span.text
 
 
 def _assigned(node: syntax.Definition) -> list[str]:

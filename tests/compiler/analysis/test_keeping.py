@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from functools import partial
+from pathlib import Path
 
 import pytest
 from plsys.compiler.analysis import Project, check_whole, keeping
@@ -117,12 +118,12 @@ class Editing:
         self.text = self.text[:at] + new + self.text[at + len(old) :]
         self.project.edit(self.document, at, at + len(old), new.encode())
 
-    def is_checked(self, number: int) -> bool:
+    def is_checked(self, number: int, may_be_late: bool = True) -> bool:
         """One round; False: the next edit came first."""
         self.scene.work()
         snapshot = self.snapshot = Snapshot.of(self.scene, number, self.snapshot)
         self.worker.take(snapshot.request)
-        if self.choices.random() < 0.2:
+        if may_be_late and self.choices.random() < 0.2:
             return False
         self.worker.go_on(lambda answer: Result(snapshot, answer).apply())
         return True
@@ -163,23 +164,70 @@ def test_definitions_are_exchanged_as_if_all_were_resolved(seed):
             editing.expect_a_fresh_start_s_messages()
 
 
-@pytest.mark.parametrize("colour", ["<Twice, n2/10, 0>", "<128, 200, 0>"], ids=["nothing to say", "a message elsewhere"])
-def test_an_edit_within_a_definition_leaves_the_namespace_alone(colour, monkeypatch):
+@pytest.fixture
+def gathered(monkeypatch) -> list[object]:
+    """The files of which all names were gathered, since the last ``clear()``."""
+    found: list[object] = []
+    gather = Names.gather
+    monkeypatch.setattr(Names, "gather", lambda self, file: found.append(file) or gather(self, file))
+    return found
+
+
+@pytest.fixture
+def leaf(tmp_path) -> Path:
+    """A file of one triangle."""
+    path = tmp_path / "leaf.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    return path
+
+
+ELSEWHERE = {
+    "nothing to say": ("", ""), "a message elsewhere": ("<Twice, n2/10, 0>", "<128, 200, 0>"), "a mesh elsewhere": ("T_turn0 box", "mesh(\"leaf.obj\")"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("elsewhere", ELSEWHERE)
+def test_an_edit_within_a_definition_leaves_the_namespace_alone(elsewhere, gathered, leaf):
     project, work = Project(), Work()
-    document = project.open(None, SCENE.replace("<Twice, n2/10, 0>", colour).encode(), name="x")
+    document = project.open(leaf.parent / "x.plsys", SCENE.replace(*ELSEWHERE[elsewhere]).encode())
     scene = project.scene_of(document)
     snapshot = Snapshot.of(scene, 0)
     work.run(snapshot.request, lambda answer: None)
-    gathered: list[object] = []
-    gather = Names.gather
-    monkeypatch.setattr(Names, "gather", lambda self, file: gathered.append(file) or gather(self, file))
-    for old, new, is_within in (("n1 > 0", "n1 > 2", True), ("n2 = order", "n2 = 4 + order", True), ("trans 0 0 1", "trans 0 0 2", True), ("disc |", "disc | 2: box |", False)):
+    gathered.clear()
+    for old, new, is_within in (("n1 > 0", "n1 > 2", True), ("n2 = order", "n2 = 4 + order", True), ("trans 0 0 1", "trans 0 0 2", True), ("scale w1", "scale all", True), ("disc |", "disc | 2: box |", False)):
         at = document.text.data.index(old.encode())
         project.edit(document, at, at + len(old), new.encode())
         scene.work()
         snapshot = Snapshot.of(scene, 0, snapshot)
         work.run(snapshot.request, lambda answer: None)
         assert bool(gathered) is not is_within
+
+
+def test_while_a_part_has_an_error_it_is_not_resolved(gathered):
+    editing = Editing(0, SCENE)
+    assert editing.is_checked(0, may_be_late=False)
+    gathered.clear()
+    # An unknown name, an edit elsewhere, a syntax error, and all is right again.
+    for number, (old, new) in enumerate((("n1 > 0", "nn > 0"), ("rotz n2", "rotz 2"), ("rotz 2", "rotz 2 +"), ("rotz 2 +", "rotz n2")), 1):
+        editing.replace(editing.text.index(old), old, new)
+        assert editing.is_checked(number, may_be_late=False) and not gathered
+        assert any(each[0] == "error" for each in told(editing.scene, editing.document))
+    editing.replace(editing.text.index("nn > 0"), "nn > 0", "n1 > 0")
+    assert editing.is_checked(9, may_be_late=False)
+    editing.expect_a_fresh_start_s_messages()
+
+
+def test_a_mesh_file_that_goes_bad_is_told(leaf):
+    project, work, before = Project(), Work(), None
+    document = project.open(leaf.parent / "x.plsys", SCENE.replace("T_turn0 box", 'mesh("leaf.obj")').encode())
+    scene = project.scene_of(document)
+    for text in (leaf.read_text(), "no triangles"):
+        leaf.write_text(text)
+        project.file_changed(leaf)
+        scene.work()
+        before = snapshot = Snapshot.of(scene, 0, before)
+        work.run(snapshot.request, lambda answer: Result(snapshot, answer).apply())
+        assert ("file" in {each[1] for each in told(scene, document)}) is (text == "no triangles")
 
 
 @pytest.mark.parametrize("scene, old, new, code", [
