@@ -1,7 +1,7 @@
 """One client's session: messages in, messages out, without a transport.
 
 ``receive`` takes the protocol's messages as plain JSON and answers through ``send``. Text notifications change the
-documents at once; what follows from them (diagnostics) is done by ``work``, when no message waits, so that the latest
+documents at once; what follows from them (updates.py) is done by ``work``, when no message waits, so that the latest
 edit wins.
 
 Example::
@@ -14,30 +14,23 @@ Example::
 from __future__ import annotations
 
 import logging
-import time
-from collections import deque
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, Callable
 
-from plsys.compiler.analysis import Checker, Deadline, Document, Folders, Found, Result, prepare_format, prepare_messages
+from plsys.compiler.analysis import Folders, prepare_messages
 
 from . import features
 from .progress import Progress
 from .request import Feature, Request
 from .text import ENCODINGS
+from .updates import Updates
 from .workspace import UnknownDocument, Workspace
 
 logger = logging.getLogger(__name__)
 
 PARSE_ERROR, INVALID_REQUEST, METHOD_NOT_FOUND, INVALID_PARAMS, INTERNAL_ERROR = -32700, -32600, -32601, -32602, -32603
 NOT_INITIALIZED, REQUEST_CANCELLED, CONTENT_MODIFIED = -32002, -32800, -32801
-
-# How long work() may go on before waiting messages are looked at, and how often diagnostics are published while it isn't
-# done; in seconds of processor time, so that a busy machine doesn't change what is published. After an edit the first ones
-# are published at once; after opening a file, those of the first slice would be a part of those of a short file.
-SLICE = 0.004
-PUBLISH_S = 0.1
 
 # What is answered while a long file is being opened, as far as it is known; other requests wait until all of it is read.
 EARLY = frozenset((
@@ -68,31 +61,20 @@ def load_features() -> dict[str, Feature]:
     return found
 
 
-class Session:
-    """``send`` takes a message to the client. ``exit_code`` is None until the client ended the session. With ``wake``,
-    whole-file checks run in a process of their own; it is called, in any thread, when their results wait for work().
-    ``is_message_waiting`` breaks off what work() does."""
+class Session(Updates):
+    """``send`` takes a message to the client. ``exit_code`` is None until the client ended the session. ``wake`` and
+    ``is_message_waiting``: see Updates."""
 
     def __init__(
         self, send: Callable[[dict], None], wake: Callable[[], None] | None = None,
         is_message_waiting: Callable[[], bool] = lambda: False,
     ) -> None:  # fmt: skip
+        super().__init__(wake, is_message_waiting)
         self._send = send
-        self._is_message_waiting = is_message_waiting
-        self._wake = wake
-        self._arrived: deque[Callable[[], None]] = deque()  # what workers found, to be taken in
-        self._checker = Checker(lambda result: self._later(self._take, result)) if wake is not None else None
         self.features = load_features()
-        self.workspace = Workspace()
-        self.client: dict[str, Any] = {}
-        self.progress = Progress(self.ask, self.notify, self.client)
         self.exit_code: int | None = None
         self._initialized = self._shut_down = False
-        self._changed: dict[Document, None] = {}  # open documents whose diagnostics may be out of date
-        self._published: dict[str, tuple[int | None, list[dict]]] = {}
-        self._published_at: dict[Document, float] = {}  # of those with work left
         self._waiting: list[dict] = []  # requests about files that are being opened
-        self._has_opened = False  # a file was opened that the checks don't know yet
         self._shown_early = False  # semantic tokens were sent without knowing all names
         self._next_id = 0
         self._asked: dict[str, Callable[[dict], None]] = {}  # requests of ours that wait for an answer
@@ -149,13 +131,17 @@ class Session:
             self._waiting.remove(message)
             self.refuse_cancelled(number)
 
+    def work(self) -> None:
+        """Do for a moment what follows from edits. Call it until ``has_work`` is false."""
+        if self.update() and (self._waiting or self._shown_early) and not self.workspace.is_opening:
+            self._answer_waiting()
+
     def _answer_waiting(self) -> None:
         waiting, self._waiting = self._waiting, []
         for message in waiting:
             self.receive(message)  # may wait again
-        refresh = ((self.client.get("workspace") or {}).get("semanticTokens") or {}).get("refreshSupport")
-        if refresh and self._shown_early:
-            self.ask("workspace/semanticTokens/refresh")
+        if self._shown_early:
+            self._refresh("semanticTokens", "semanticTokens")
         self._shown_early = False
 
     def _request(self, number: Any, method: str, params: dict) -> None:
@@ -273,10 +259,7 @@ class Session:
 
     def _did_open(self, params: dict) -> None:
         given = params["textDocument"]
-        document = self.workspace.did_open(given["uri"], given["text"], given["version"])
-        self._published_at[document] = time.thread_time()
-        self._has_opened = True
-        self._touch(document)
+        self._opened(self.workspace.did_open(given["uri"], given["text"], given["version"]))
 
     def _did_change(self, params: dict) -> None:
         given = params["textDocument"]
@@ -285,17 +268,12 @@ class Session:
             self._refuse(message["id"], CONTENT_MODIFIED, "the text has changed")
         document = self.workspace.did_change(given["uri"], given["version"], params["contentChanges"])
         if document is not None:
-            self._published_at.pop(document, None)
-            self._touch(document)
+            self._edited(document)
 
     def _did_close(self, params: dict) -> None:
         uri = params["textDocument"]["uri"]
         document = self.workspace.did_close(uri)
-        if document is not None:
-            self._changed.pop(document, None)
-            self._touch_all()
-        if self._published.pop(uri, (None, []))[1]:
-            self.notify("textDocument/publishDiagnostics", {"uri": uri, "diagnostics": []})
+        self._closed(document, uri)
 
     def _did_change_watched_files(self, params: dict) -> None:
         self.workspace.files_changed([change["uri"] for change in params["changes"]])
@@ -307,116 +285,6 @@ class Session:
         added = [self.workspace.add_folder(folder["uri"]) for folder in params["event"].get("added", ())]
         self.workspace.scans.scan(path for path in added if path is not None)
         self._touch_all()
-
-    # --- what follows from edits
-
-    def _touch(self, document: Document) -> None:
-        """Remember that ``document`` and those that share a scene with it need new diagnostics."""
-        self._changed[document] = None
-        for scene in document.scenes:
-            if self._checker is not None:
-                self._checker.want(scene)
-            for other in scene.documents:
-                if other in self.workspace.uris:
-                    self._changed[other] = None
-
-    def _touch_all(self) -> None:
-        for document in self.workspace.uris:
-            self._touch(document)
-
-    @property
-    def has_work(self) -> bool:
-        return bool(self._changed or self._arrived) or self.workspace.is_opening
-
-    def work(self) -> None:
-        """Read and resolve for a moment what edits touched, and publish what is known. Call it until ``has_work`` is
-        false."""
-        if self._arrived:
-            self._arrived.popleft()()  # one at a time: a message may come
-        finished = self.workspace.project.work(Deadline(SLICE, self._is_message_waiting))
-        if not finished and self._is_message_waiting():
-            return  # what is known now is about to be out of date
-        documents, now = self._with_neighbours(), time.thread_time()
-        if finished:
-            self._changed.clear()
-        if (self.client.get("textDocument") or {}).get("diagnostic") is None:
-            for document in documents:
-                if finished or now - self._published_at.get(document, -PUBLISH_S) >= PUBLISH_S:
-                    self._publish(document)
-                    self._published_at[document] = now
-        if finished:
-            self._published_at.clear()
-        if self._has_opened and not self.workspace.is_opening and self._checker is not None:
-            self._has_opened = False
-            self._checker.go()  # before anything is typed: the worker has a lot to read
-        if (self._waiting or self._shown_early) and not self.workspace.is_opening:
-            self._answer_waiting()
-
-    def _with_neighbours(self) -> list[Document]:
-        """The open documents that changed or are in a scene with one that did: an edit may have changed which."""
-        found = dict(self._changed)
-        for document in self._changed:
-            for scene in document.scenes:
-                found.update((other, None) for other in scene.documents if other in self.workspace.uris)
-        return list(found)
-
-    def start_checks(self) -> None:
-        """Have what changed checked as a whole. To be called when the client has paused."""
-        if self._checker is not None and not self._changed:
-            self._checker.go()
-            if self._checker.is_idle:
-                self.progress.end("checks")
-
-    def prepare(self) -> bool:
-        """Do for a moment, in a pause, what a request would have to wait for; whether nothing is left of that."""
-        deadline = Deadline(SLICE, lambda: self._is_message_waiting() or bool(self._arrived))
-        return self.has_work or all(prepare_format(document, deadline) for document in list(self.workspace.uris))
-
-    def _later(self, take: Callable[[Any], None], what: Any) -> None:
-        """Have ``work`` take in what a worker found. In any thread."""
-        self._arrived.append(lambda: take(what))
-        self._wake()
-
-    def _take_found(self, found: Found) -> None:
-        """Something was found in the folders: other scenes may include what is open."""
-        self.workspace.take(found)
-        if found.is_last and not self.workspace.scans.is_reading:
-            self.progress.end("scan")
-        elif found.total:
-            said = f"{found.done:,} of {found.total:,} files"
-            self.progress.report("scan", "Reading scenes", said, 100 * found.done // found.total)
-        self._touch_all()
-
-    def _take(self, result: Result) -> None:
-        """Show what the whole-file checks found."""
-        result.apply()
-        if result.answer.is_piece:
-            return
-        if not result.answer.more:
-            self.progress.end("checks")
-        elif result.answer.share is not None:
-            name = result.snapshot.scene.root.text.name.rpartition("/")[2]
-            self.progress.report("checks", "Checking", name, int(100 * result.answer.share))
-        for document in result.snapshot.scene.documents:
-            if document in self.workspace.uris:
-                self._changed[document] = None
-        refresh = ((self.client.get("workspace") or {}).get("diagnostics") or {}).get("refreshSupport")
-        if refresh and (self.client.get("textDocument") or {}).get("diagnostic") is not None:
-            self.ask("workspace/diagnostic/refresh")
-        refresh = ((self.client.get("workspace") or {}).get("inlayHint") or {}).get("refreshSupport")
-        if refresh and (result.answer.insights or not result.answer.more):
-            self.ask("workspace/inlayHint/refresh")
-
-    def _publish(self, document: Document) -> None:
-        uri = self.workspace.uris.get(document)
-        if uri is None:
-            return
-        found = self.workspace.diagnostics(document)
-        if self._published.get(uri) == (document.version, found):
-            return
-        self._published[uri] = document.version, found
-        params = {"uri": uri, "version": document.version, "diagnostics": found}
-        self.notify("textDocument/publishDiagnostics", params)
 
 
 def _uri(message: dict) -> str | None:

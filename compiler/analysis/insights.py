@@ -5,7 +5,7 @@ move them and an edit of their block drops them until the next ones arrive.
 
 Example::
 
-    scene.insights = kept(placed, result_span)
+    scene.insights.update(kept(placed, result_span))
     for start, end, insight in insights_in(scene, document, 0, 4000): …
 """
 

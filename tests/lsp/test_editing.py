@@ -173,7 +173,7 @@ def test_what_a_calculation_assigns_is_not_missed_while_it_is_typed():
 
 def test_what_is_published_first_of_a_file_is_complete_on_a_slow_machine(monkeypatch):
     """A file's first messages aren't those of a first slice of work, which may be none."""
-    monkeypatch.setattr("plsys.lsp.session.SLICE", 0.0)
+    monkeypatch.setattr("plsys.lsp.updates.SLICE", 0.0)
     editor = Editor("object { Tre }\nSelection Tree { Tree -> box; }\n")
     editor.codes()
     sent = [each["params"] for each in editor.sent if each.get("method") == "textDocument/publishDiagnostics"]

@@ -75,7 +75,7 @@ def test_braces_in_comments_and_strings_do_not_count():
 
 
 def test_what_was_prepared_in_a_pause_is_what_formats(monkeypatch):
-    monkeypatch.setattr("plsys.lsp.session.SLICE", 0.0)
+    monkeypatch.setattr("plsys.lsp.updates.SLICE", 0.0)
     text = "".join(f"Calculation C{i}{{n=1;}}\n" for i in range(20)) + "Calculation D{ n = ; }\n"
     prepared, fresh = Editor(text), Editor(text)
     prepared.published()
