@@ -127,6 +127,7 @@ class PlStatistics(ctypes.Structure):
         ("terrain_bytes", c_uint64),
         ("terrain_node_bytes", c_uint64),
         ("seconds_trace_cpu", c_double),
+        ("lazy_visited", c_uint64),
     ]
 
 

@@ -8,7 +8,7 @@
 #include "error.h"
 #include "random.h"
 
-enum { FEWEST_COSTLY = 256, MOST_COSTLY = 1 << 14 };
+enum { FEWEST_BUCKETS = 16, FEWEST_COSTLY = 16, MOST_COSTLY = 1 << 14 };
 
 typedef struct entry {
     struct entry *next;
@@ -32,7 +32,7 @@ struct pl_classes {
     costly *costly;
     uint32_t bucket_count, costly_count;
     size_t bytes, limit;
-    uint64_t count, emptied;
+    uint64_t count;
     pl_range *scope, *live;
 };
 
@@ -41,7 +41,7 @@ pl_classes *pl_classes_create(const pl_program *program, pl_mesh_tree *const *me
     pl_classes *c = calloc(1, sizeof *c);
     if (c) {
         c->program = program;
-        c->bucket_count = 64;
+        c->bucket_count = FEWEST_BUCKETS;
         while (c->bucket_count < (1u << 20) && (size_t)c->bucket_count * 256 < limit) c->bucket_count *= 2;
         c->costly_count = FEWEST_COSTLY;
         while (c->costly_count < MOST_COSTLY && 8 * c->costly_count * sizeof(costly) < limit) c->costly_count *= 2;
@@ -89,7 +89,7 @@ void pl_classes_free(pl_classes *c)
 void pl_classes_count(pl_classes *c, pl_class_counts *counts)
 {
     pthread_mutex_lock(&c->lock);
-    *counts = (pl_class_counts){c->count, c->emptied, pl_class_walk_visited(c->walk)};
+    *counts = (pl_class_counts){c->count, pl_class_walk_visited(c->walk)};
     pthread_mutex_unlock(&c->lock);
 }
 
@@ -114,10 +114,7 @@ static void add(pl_classes *c, uint32_t symbol, const pl_range *live, uint64_t h
 {
     const size_t more = c->program->nodes[symbol].as.symbol.live_count * sizeof *live, bytes = sizeof(entry) + more;
     if (find(c, symbol, live, hash)) return;
-    if (c->bytes + bytes + 16 > c->limit) {
-        empty(c);
-        c->emptied++;
-    }
+    if (c->bytes + bytes + 16 > c->limit) empty(c);
     entry *e = c->bytes + bytes + 16 <= c->limit ? malloc(bytes) : NULL;
     if (!e) return;
     entry **bucket = &c->buckets[hash & (c->bucket_count - 1)];

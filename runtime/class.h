@@ -46,9 +46,9 @@ void pl_classes_bound(pl_classes *classes, uint32_t symbol, const pl_scope *scop
 void pl_classes_gate(pl_classes *classes, uint32_t symbol, const pl_scope *scope, pl_gate_box *gate);
 pl_gate_box pl_bounds_gate(const pl_bounds *bounds);
 
-/* Classes in the table now, how often it was emptied, and nodes visited. */
+/* Classes in the table now, and nodes visited. */
 typedef struct pl_class_counts {
-    uint64_t classes, emptied, visited;
+    uint64_t classes, visited;
 } pl_class_counts;
 void pl_classes_count(pl_classes *classes, pl_class_counts *counts);
 

@@ -86,9 +86,9 @@ const pl_transform *pl_memo_find(pl_memo *memo, uint32_t node, const double *par
         uint64_t bits;
         memo->sought.values[i] = parameters[l->slots[i]];
         memcpy(&bits, &memo->sought.values[i], sizeof bits);
-        hash = (hash ^ bits) * UINT64_C(0x9E3779B97F4A7C15);
+        hash = pl_quick_hash(hash, bits);
     }
-    memo->found = &memo->places[hash >> 57];
+    memo->found = &memo->places[pl_quick_place(hash, PLACES)];
     return memcmp(&memo->found->key, &memo->sought, sizeof memo->sought) == 0 ? &memo->found->transform : NULL;
 }
 

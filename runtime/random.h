@@ -77,4 +77,16 @@ static inline double pl_hash(uint64_t seed_key, size_t n, const double *argument
     return pl_unit(h);
 }
 
+/* A quick hash of numbers' bits, one after the other, and its place in a small table: by the upper bits, since whole numbers
+ * have zeros in all others. */
+static inline uint64_t pl_quick_hash(uint64_t hash, uint64_t bits)
+{
+    return (hash ^ bits) * PL_RANDOM_MIX_ADD_X;
+}
+
+static inline size_t pl_quick_place(uint64_t hash, uint32_t places)
+{
+    return (size_t)((hash >> 32) * places >> 32);
+}
+
 #endif

@@ -166,7 +166,7 @@ static bool gate_by_classes(pl_scene *scene, pl_error *error)
 {
     scene->accel = scene->accel == &pl_accel_bvh ? &pl_accel_lazy : &pl_accel_none;
     scene->detail = scene->options.detail;
-    scene->gates = pl_classes_create(scene->program, scene->meshes, pl_lazy_budget(scene) / 4, error);
+    scene->gates = pl_classes_create(scene->program, scene->meshes, pl_lazy_class_budget(pl_lazy_budget(scene)), error);
     scene->covers = scene->gates ? pl_covers_create(scene->program, scene->meshes, scene->gates, error) : NULL;
     return scene->covers != NULL;
 }
@@ -428,5 +428,6 @@ void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics)
     statistics->lazy_states = lazy.states;
     statistics->lazy_bytes = lazy.bytes;
     statistics->lazy_classes = lazy.classes;
+    statistics->lazy_visited = lazy.visited;
     statistics->scene_bytes += lazy.bytes;
 }

@@ -303,7 +303,8 @@ class Scene:
         its start}, accelerator, threads,
         detail (the cut-off in pixels, 0: none), cut {instances: rays that ended at a cut instance's box, max_error: the
         largest error bound of their distance, in scene units}, lazy {unfolded, evicted: states, where there are too many to
-        build; found: times that a ray came to one in memory; states, bytes, classes: of these in memory now}.
+        build; found: times that a ray came to one in memory; states, bytes, classes: of these in memory now; visited: nodes, to bound
+        classes}.
 
         Of bvh: isa (None: another accelerator), front {count, items, instances: items that are one, limit: items that one
         has, None: everything; where not everything fits, pilot_rays, pilot_seconds, entries: instances that a ray is then expected to enter,

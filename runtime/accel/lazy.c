@@ -199,7 +199,7 @@ static pl_lazy_state *state_of(pl_tracer *tracer, size_t index, pl_error *error)
         const uint64_t *scope = !index ? NULL : above ? w->scope : w->scopes + index * w->scope_words;
         bool full;
         if (above) pl_lazy_scope(tracer->scene->program, above, &above->pattern->items[f->item], w->scope_words, w->scope);
-        pl_lazy_state *state = pl_lazy_get(tracer->scene->structure, w->half, w->unfolder, f->symbol, scope, &w->spent, &full, error);
+        pl_lazy_state *state = pl_lazy_get(tracer->scene->structure, w->half, w->unfolder, f->symbol, scope, index && !above, &w->spent, &full, error);
         if (!state && (!full || !change(tracer, error))) return NULL;
         w->frames[index].state = state;
     }

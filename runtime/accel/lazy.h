@@ -104,6 +104,9 @@ typedef struct pl_unfolder pl_unfolder; /* a thread's working memory (lazy_unfol
 /* What a scene's budget leaves for states and classes. */
 size_t pl_lazy_budget(const pl_scene *scene);
 
+/* The classes' share of it. */
+size_t pl_lazy_class_budget(size_t limit);
+
 pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_error *error);
 void pl_lazy_cache_free(pl_lazy_cache *cache);
 
@@ -113,16 +116,17 @@ pl_lazy_half *pl_lazy_hold(pl_lazy_cache *cache);
 pl_lazy_half *pl_lazy_change(pl_lazy_cache *cache, pl_lazy_half *half);
 void pl_lazy_release(pl_lazy_cache *cache, pl_lazy_half *half);
 
-/* The state that a packed scope leads to at a symbol (UINT32_MAX, NULL: the scene itself). NULL: an error or, with `full` set, no room in
- * the half. *work grows by the nodes that were visited to unfold it and to bound what it consists of. */
+/* The state that a packed scope leads to at a symbol (UINT32_MAX, NULL: the scene itself). again: no state points at it, since it
+ * was let go. NULL: an error or, with `full` set, no room in the half. *work grows by the nodes that were visited to unfold it
+ * and to bound what it consists of. */
 pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder *unfolder, uint32_t symbol,
-                           const uint64_t *scope, uint64_t *work, bool *full, pl_error *error);
+                           const uint64_t *scope, bool again, uint64_t *work, bool *full, pl_error *error);
 
 /* The coverage (cut.h) of the state that a packed scope leads to at a symbol, from a direction of its frame. */
 double pl_lazy_coverage(pl_unfolder *unfolder, uint32_t symbol, const uint64_t *scope, const double d[3]);
 
 typedef struct pl_lazy_counts {
-    uint64_t states, bytes, found, unfolded, evicted, classes, classes_emptied, classes_visited;
+    uint64_t states, bytes, found, unfolded, evicted, classes, visited;
 } pl_lazy_counts;
 void pl_lazy_count(pl_lazy_cache *cache, pl_lazy_counts *counts);
 

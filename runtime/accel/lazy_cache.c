@@ -8,7 +8,11 @@
 #include "../table.h"
 #include "lazy.h"
 
-enum { SMALLEST_BUDGET = 16384, SMALLEST_CHUNK = 4096, LARGEST_CHUNK = 1 << 20, BYTES_A_BUCKET = 1024 };
+enum { SMALLEST_BUDGET = 16384, SMALLEST_CHUNK = 2048, LARGEST_CHUNK = 1 << 20, BYTES_A_BUCKET = 1024 };
+
+/* Bytes for a dozen classes. What a tree consists of is in so many, and if not all of them fit, unfolding a state means following
+ * the graph below it again: that took 30 times as long. */
+enum { FEW_CLASSES = 16384 };
 
 typedef struct chunk {
     struct chunk *next;
@@ -22,6 +26,7 @@ struct pl_lazy_half {
     size_t bytes;
     uint64_t states;
     uint64_t epoch; /* since it was emptied last; never that of another half */
+    atomic_bool loose; /* some states with keys of their own can be looked up */
     unsigned users; /* rays that stand in it */
 };
 
@@ -54,17 +59,33 @@ static bool do_keys_repeat(const pl_program *program)
     return false;
 }
 
+static size_t taken_of(const pl_scene *scene)
+{
+    return scene->program->bytes + scene->mesh_bytes;
+}
+
 size_t pl_lazy_budget(const pl_scene *scene)
 {
-    const size_t taken = scene->program->bytes + scene->mesh_bytes;
+    const size_t taken = taken_of(scene);
     return scene->memory > taken ? scene->memory - taken : 0;
+}
+
+size_t pl_lazy_class_budget(size_t limit)
+{
+    const size_t most = limit / 2 < FEW_CLASSES ? limit / 2 : FEW_CLASSES;
+    return limit / 4 > most ? limit / 4 : most;
+}
+
+static size_t limit_of_half(size_t limit)
+{
+    return (limit - pl_lazy_class_budget(limit)) / 2;
 }
 
 pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_error *error)
 {
     if (limit < SMALLEST_BUDGET) {
-        pl_fail(error, PL_ERROR_LIMIT, "states", "memory: states that are unfolded when they are needed take at least %d bytes more than %zu",
-                SMALLEST_BUDGET, limit);
+        pl_fail(error, PL_ERROR_LIMIT, "states", "memory: states that are unfolded when they are needed take at least %zu bytes in all",
+                taken_of(scene) + SMALLEST_BUDGET);
         return NULL;
     }
     pl_lazy_cache *cache = calloc(1, sizeof *cache);
@@ -74,14 +95,14 @@ pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_erro
     }
     cache->scene = scene;
     cache->keys_repeat = do_keys_repeat(scene->program);
-    cache->classes = scene->gates ? scene->gates : pl_classes_create(scene->program, scene->meshes, limit / 4, error);
+    cache->classes = scene->gates ? scene->gates : pl_classes_create(scene->program, scene->meshes, pl_lazy_class_budget(limit), error);
     bool ok = cache->classes != NULL;
     pthread_mutex_init(&cache->lock, NULL);
     pthread_cond_init(&cache->released, NULL);
     cache->current = &cache->halves[0];
     cache->bucket_count = 16;
     while (cache->bucket_count < (1u << 20) && (size_t)cache->bucket_count * BYTES_A_BUCKET < limit) cache->bucket_count *= 2;
-    cache->limit = (limit - limit / 4) / 2;
+    cache->limit = limit_of_half(limit);
     cache->chunk_size = cache->limit / 16;
     cache->chunk_size = cache->chunk_size < SMALLEST_CHUNK   ? SMALLEST_CHUNK
                         : cache->chunk_size > LARGEST_CHUNK ? LARGEST_CHUNK
@@ -165,6 +186,7 @@ static void empty(pl_lazy_cache *cache, pl_lazy_half *half)
     }
     memset(half->buckets, 0, cache->bucket_count * sizeof *half->buckets);
     half->states = 0;
+    half->loose = false;
     half->epoch = ++cache->epochs;
 }
 
@@ -186,7 +208,7 @@ pl_lazy_half *pl_lazy_change(pl_lazy_cache *cache, pl_lazy_half *half)
     return half;
 }
 
-/* Room for a state, however large it is, if it is the first one. */
+/* Room for a state. There is always some for the first one. */
 static void *allocate(pl_lazy_cache *cache, pl_lazy_half *half, size_t bytes, bool *full)
 {
     bytes = (bytes + 15) & ~(size_t)15;
@@ -228,15 +250,26 @@ static pl_lazy_state *find(pl_lazy_state *bucket, uint64_t hash, uint32_t symbol
 }
 
 /* Whether a state has a random key of its own: then it is on one path only, and isn't looked up but found by the item that
- * enters it. Rays that let go of it unfold it again. */
+ * enters it. Only where it was let go nothing enters it: then the rays after must find it in the half, or all of them would
+ * unfold the states of which there is one, however large, again. */
 static bool is_met_once(const pl_lazy_cache *cache, uint32_t symbol)
 {
     return !cache->keys_repeat && symbol != UINT32_MAX && cache->scene->program->nodes[symbol].as.symbol.draws;
 }
 
+/* A state may take half of a half: if it is let go, at least as much was unfolded as it takes to unfold it again. */
+static bool fail_room(const pl_lazy_cache *cache, uint32_t symbol, size_t bytes, pl_error *error)
+{
+    size_t limit = SMALLEST_BUDGET;
+    while (bytes > limit_of_half(limit) / 2) limit += limit / 64;
+    return pl_fail_at(error, PL_ERROR_LIMIT, cache->scene->program, symbol == UINT32_MAX ? 0 : symbol,
+                      "memory: a state of %zu bytes is unfolded when it is needed, which takes about %zu bytes in all", bytes,
+                      taken_of(cache->scene) + limit);
+}
+
 /* Two threads may unfold the same state: then there are two of it. */
 pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder *unfolder, uint32_t symbol,
-                           const uint64_t *scope, uint64_t *work, bool *full, pl_error *error)
+                           const uint64_t *scope, bool again, uint64_t *work, bool *full, pl_error *error)
 {
     uint32_t words;
     size_t bytes;
@@ -246,10 +279,10 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder
         pl_fail_memory(error, "unfolding a state");
         return NULL;
     }
-    const bool once = is_met_once(cache, symbol);
+    const bool listed = again || !is_met_once(cache, symbol);
     pl_lazy_state *state = NULL, **bucket = NULL;
     uint64_t hash = symbol;
-    if (!once) {
+    if (listed || half->loose) {
         for (uint32_t i = 0; i < words; i++) hash = pl_mix(hash, key[i]);
         bucket = bucket_of(cache, half, hash);
         pthread_mutex_lock(&cache->lock);
@@ -261,6 +294,10 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder
         return state;
     }
     if (!pl_unfolder_prepare(unfolder, symbol, cache->classes, half->epoch, &bytes, work, error)) return NULL;
+    if (bytes > cache->limit / 2) {
+        fail_room(cache, symbol, bytes, error);
+        return NULL;
+    }
     pthread_mutex_lock(&cache->lock);
     void *memory = allocate(cache, half, bytes, full);
     cache->unfolded += memory != NULL;
@@ -270,9 +307,10 @@ pl_lazy_state *pl_lazy_get(pl_lazy_cache *cache, pl_lazy_half *half, pl_unfolder
         return NULL;
     }
     state = pl_unfolder_write(unfolder, symbol, memory, error);
-    if (once || !state) return state;
+    if (!listed || !state) return state;
     state->hash = hash;
     pthread_mutex_lock(&cache->lock);
+    half->loose = half->loose || again;
     state->next = *bucket;
     *bucket = state;
     pthread_mutex_unlock(&cache->lock);
@@ -297,7 +335,6 @@ void pl_lazy_count(pl_lazy_cache *cache, pl_lazy_counts *counts)
                                .unfolded = cache->unfolded,
                                .evicted = cache->evicted,
                                .classes = classes.classes,
-                               .classes_emptied = classes.emptied,
-                               .classes_visited = classes.visited};
+                               .visited = classes.visited};
     pthread_mutex_unlock(&cache->lock);
 }

@@ -89,8 +89,8 @@ static known_pattern *place_of(pl_unfolder *u, uint32_t symbol, uint64_t epoch)
     const uint64_t *live = (const uint64_t *)u->key.data + 1;
     const size_t count = u->key.count - 1;
     uint64_t hash = symbol;
-    for (size_t i = 0; i < count; i++) hash = (hash ^ live[i]) * UINT64_C(0x9E3779B97F4A7C15);
-    known_pattern *place = &u->patterns[(hash >> 32) % KNOWN_PATTERNS];
+    for (size_t i = 0; i < count; i++) hash = pl_quick_hash(hash, live[i]);
+    known_pattern *place = &u->patterns[pl_quick_place(hash, KNOWN_PATTERNS)];
     if (place->epoch == epoch && place->symbol == symbol && memcmp(place->live, live, count * sizeof *live) == 0) return place;
     *place = (known_pattern){.symbol = symbol};
     memcpy(place->live, live, count * sizeof *live);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "../error.h"
+#include "../random.h"
 
 /* Of an event of the derivation, in nodes visited by a walk over a class. */
 enum { EVENT_WORK = 4 };
@@ -102,9 +103,9 @@ static const known_bounds *bounds_of(pl_unfolder *u, pl_classes *classes, uint32
     uint64_t live[MOST_LIVE], hash = symbol;
     for (uint32_t i = 0; i < count && i < MOST_LIVE; i++) {
         memcpy(&live[i], &u->walk.scope.parameters[program->slots[node->as.symbol.live_first + i]], sizeof live[i]);
-        hash = (hash ^ live[i]) * UINT64_C(0x9E3779B97F4A7C15);
+        hash = pl_quick_hash(hash, live[i]);
     }
-    known_bounds *known = &u->known[(hash >> 32) % KNOWN_BOUNDS];
+    known_bounds *known = &u->known[pl_quick_place(hash, KNOWN_BOUNDS)];
     if (count <= MOST_LIVE && known->count == count + 1 && known->symbol == symbol &&
         (!count || memcmp(known->live, live, count * sizeof *live) == 0))
         return known;

@@ -152,6 +152,7 @@ typedef struct pl_statistics {
     double front_entries, front_pilot_seconds;
     uint64_t terrain_triangles, terrain_bytes, terrain_node_bytes; /* in the tiles; of bytes_items and bytes_nodes */
     double seconds_trace_cpu; /* that the threads of renderings ran, added up */
+    uint64_t lazy_visited; /* nodes of the graph, to bound classes */
 } pl_statistics;
 
 PL_API void pl_scene_statistics(const pl_scene *scene, pl_statistics *statistics);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 
@@ -126,6 +127,59 @@ def test_states_that_differ_by_draws_are_the_same_in_every_accelerator_and_budge
     expected, _ = picture(data, accelerator="none", detail=px, threads=2)
     found, counts = picture(data, memory=memory, detail=px, threads=2)
     assert counts["lazy"]["unfolded"] > 0
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values, err_msg=name)
+
+
+def test_states_of_each_depth_share_a_pattern():
+    """Their parameters are whole numbers, which differ in few bits: patterns of all depths are remembered at once."""
+    data = build(Source("forest.plsys", (SWAYING % (4, 7, *APPLICATIONS["maps"])).encode())).encode()
+    _, counts = picture(data, memory=24_000_000, detail=2.0, threads=1)
+    assert counts["lazy"]["evicted"] == 0 < counts["lazy"]["states"]
+    assert counts["lazy"]["bytes"] < 400 * counts["lazy"]["states"]
+
+
+@pytest.mark.parametrize("drawn", ["maps", "what is there", "sizes"])
+def test_in_the_smallest_budgets_classes_are_bounded_once(drawn):
+    """Else the graph below a state is followed again whenever that is unfolded, which took a minute."""
+    data = build(Source("forest.plsys", (SWAYING % (1, 3, *APPLICATIONS[drawn])).encode())).encode()
+    expected, _ = picture(data, accelerator="none")
+    for memory in (32_000, 64_000):
+        found, counts = picture(data, memory=memory, threads=2)
+        assert counts["lazy"]["evicted"] > 100
+        assert counts["lazy"]["visited"] < 500
+        for name, values in expected.items():
+            np.testing.assert_array_equal(found[name], values, err_msg=f"{memory} {name}")
+
+
+def row_of_trees(count: int) -> bytes:
+    """All of them in one production, whose state is large."""
+    trees = " + ".join(f"[ trans {k % 20} {k // 20} 0; rotz 360*rand({k}) ] Tree" for k in range(count))
+    start, end = FOREST.index("Selection Forest {"), FOREST.index("Selection Tree {")
+    text = FOREST[:start] + f"Selection Forest {{ Forest -> {trees}; }}" + FOREST[end:] % 5
+    return build(Source("row.plsys", text.encode())).encode()
+
+
+def test_a_large_state_that_was_let_go_is_unfolded_once():
+    """The item that enters it doesn't know of it any more; if each ray unfolded it again, nothing else would fit beside it."""
+    data = row_of_trees(400)
+    expected, _ = picture(data)
+    found, counts = picture(data, memory=2_000_000, threads=1)
+    assert counts["lazy"]["evicted"] > 0
+    assert counts["lazy"]["unfolded"] < 80_000
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values, err_msg=name)
+
+
+def test_a_state_that_is_too_large_for_a_budget_names_the_need():
+    """Nearly nothing would fit beside it, and it would be unfolded again for each of its items that a ray meets."""
+    data = row_of_trees(200)
+    with pytest.raises(PlsysRuntimeError, match=r"memory: a state of \d+ bytes .* takes about \d+ bytes") as raised:
+        picture(data, memory=100_000)
+    need = int(re.search(r"about (\d+)", str(raised.value))[1])
+    expected, _ = picture(data)
+    found, counts = picture(data, memory=need, threads=1)
+    assert 0 < counts["lazy"]["bytes"] < need
     for name, values in expected.items():
         np.testing.assert_array_equal(found[name], values, err_msg=name)
 
