@@ -231,11 +231,17 @@ def test_a_ray_along_a_cylinder_s_axis_and_beside_it_is_free(count):
 
 def test_a_plane_is_met_by_those_who_go_towards_it():
     """Rays of one packet from both sides of it, from upon it, and along it, zeros of either sign included."""
-    data = compile("camera { location -9 look_at 0 } plane { <0, 0, 1>, 0 pigment { color rgb 1 } }")
-    heights, climbs = (2.0, 1e-300, 0.0, -0.0, -1e-300, -2.0), (0.1, 1e-300, 0.0, -0.0, -1e-300, -0.1)
+    beside = "".join(f"sphere {{ <9, {y}, 0>, 1 pigment {{ color rgb 1 }} }}" for y in (-40, 40))  # packets begin close together
+    data = compile("camera { location -9 look_at 0 } plane { <0, 0, 1>, 0 pigment { color rgb 1 } }" + beside)
+    heights, climbs = (2.0, 1e-300, 0.0, -0.0, -1e-300, -2.0), (0.05, 1e-300, 0.0, -0.0, -1e-300, -0.05)
     origins = np.array([(0.0, 0.0, z) for z in heights for _ in climbs])
     directions = np.array([(1.0, 0.0, z) for _ in heights for z in climbs])
     expected = answers(data, origins, directions, accelerator="none")
     assert 0 < np.isfinite(expected["t"]).sum() < len(origins)
+    tests = {}
     for isa in available(data):
         assert_same(answers(data, origins, directions, isa=isa), expected, isa)
+        with Scene(data, isa=isa) as scene:
+            scene.intersect(origins, directions)
+            tests[isa] = scene.statistics["box_tests"]
+        assert isa == "scalar" or tests[isa] < 0.5 * tests["scalar"]
