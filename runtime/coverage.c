@@ -8,58 +8,22 @@
  * Which parts a ray meets doesn't depend on what they cover. So it is found once; a finite state then follows from its
  * parts, and endless ones, all together, are iterated from 1 towards their fixpoint. The rays' numbers are pure functions of
  * state and direction, so coverages are the same in every run. */
-#include "coverage.h"
+#include "coverage_rays.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "error.h"
-#include "random.h"
 
-enum {
-    SIDE = 8, /* of a bundle's square of rays */
-    RAYS = SIDE * SIDE,
-    MOST_PARTS = 1024,
-    ROUNDS = 200,
-    /* Bundles go in squares about a direction: 2·2 to 6·6. What is sparse needs many rays, and has few parts. */
-    FEWEST_BUNDLES = 2,
-    MOST_BUNDLES = 6,
-    ALL_BUNDLES = PL_COVERAGE_DIRECTIONS * MOST_BUNDLES * MOST_BUNDLES,
-    /* Parts times bundles, about each direction: shared by all states, but so many for one of them. */
-    WORK = 1 << 16,
-    LEAST_WORK = 512,
-    MOST_WORK = 4096
-};
+enum { ROUNDS = 200 };
 
-#define TURN 0.5      /* widths of the square of directions about each of the thirteen */
-#define PARTS 0.125   /* of the diameter: instances so small aren't opened */
 #define SETTLED 1e-4f /* the iteration's last change */
-
-/* Signs of the thirteen directions. */
-static const signed char directions[PL_COVERAGE_DIRECTIONS][3] = {
-    {1, 0, 0}, {0, 1, 0},  {0, 0, 1}, {1, 1, 0},  {1, -1, 0},  {1, 0, 1},  {1, 0, -1},
-    {0, 1, 1}, {0, 1, -1}, {1, 1, 1}, {1, 1, -1}, {1, -1, 1}, {-1, 1, 1}};
 
 /* Of one state, by direction, and the largest of them. */
 typedef struct shares {
     float by[PL_COVERAGE_DIRECTIONS], most;
 } shares;
-
-/* A ray meets a part. */
-typedef struct meeting {
-    uint32_t part; /* a state; 0: a primitive */
-    uint16_t bundle;
-    uint8_t ray, direction; /* the direction in the part's frame */
-} meeting;
-
-typedef struct meetings {
-    meeting *list;
-    size_t count, capacity;
-    uint16_t bundles; /* about each direction; squared */
-    uint64_t counted[ALL_BUNDLES]; /* bits of the rays that meet the box at all */
-} meetings;
 
 struct pl_coverage {
     pl_states *states;
@@ -68,276 +32,23 @@ struct pl_coverage {
     shares *shares;
 };
 
-/* The nearest of the directions: along the largest of |d|, its two largest or all three. */
-int pl_coverage_direction(const double d[3])
-{
-    const double x = fabs(d[0]), y = fabs(d[1]), z = fabs(d[2]);
-    const int least = x <= y && x <= z ? 0 : y <= z ? 1 : 2, most = x >= y && x >= z ? 0 : y >= z ? 1 : 2;
-    const double sum = x + y + z, two = (sum - fabs(d[least])) * 0.70710678118654752, three = sum * 0.57735026918962576;
-    const bool nx = d[0] < 0.0, ny = d[1] < 0.0, nz = d[2] < 0.0;
-    if (fabs(d[most]) >= two && fabs(d[most]) >= three) return most;
-    if (two >= three) return least == 2 ? 3 + (nx != ny) : least == 1 ? 5 + (nx != nz) : 7 + (ny != nz);
-    return nx == ny ? (nx == nz ? 9 : 10) : nx == nz ? 11 : 12;
-}
-
-/* --- parts --- */
-
-typedef struct part {
-    const pl_item *item; /* NULL: the state itself, as the first of the queue */
-    pl_affine to_parent, to_object;
-    double stretch;
-    double centre[3], half[3][3]; /* of a box that holds it: half its edges, in the state's frame */
-} part;
-
-typedef struct parts {
-    part *list; /* a queue: those before `head` were opened */
-    size_t head, count, capacity;
-} parts;
-
-static void set_box(const pl_states *states, part *p)
-{
-    const pl_item *item = p->item;
-    pl_box box;
-    memset(p->half, 0, sizeof p->half);
-    if (item->kind == PL_NODE_ENTER) {
-        const pl_box *own = &states->list[item->what].bounds->box;
-        double middle[3];
-        for (int k = 0; k < 3; k++) {
-            middle[k] = 0.5 * (own->lo[k] + own->hi[k]);
-            for (int axis = 0; axis < 3; axis++)
-                p->half[k][axis] = 0.5 * (own->hi[k] - own->lo[k]) * p->to_parent.m[4 * axis + k];
-        }
-        pl_affine_point(&p->to_parent, middle, p->centre);
-        return;
-    }
-    if (item->kind == PL_NODE_MESH) box = pl_box_map(&p->to_parent, pl_mesh_box(states->meshes[item->what]));
-    else box = pl_shape_box(pl_shape_of(item->what), item->arguments, p->to_parent.m);
-    for (int axis = 0; axis < 3; axis++) {
-        p->centre[axis] = 0.5 * (box.lo[axis] + box.hi[axis]);
-        p->half[axis][axis] = 0.5 * (box.hi[axis] - box.lo[axis]);
-    }
-}
-
-static bool add_part(const pl_states *states, parts *all, const part *parent, const pl_item *item)
-{
-    if (pl_item_primitives(states, item) == 0 || pl_item_unbounded(states, item)) return true;
-    if (item->kind == PL_NODE_ENTER && pl_box_is_empty(&states->list[item->what].bounds->box)) return true;
-    if (all->count == all->capacity) {
-        size_t capacity = all->capacity ? 2 * all->capacity : 256;
-        part *list = realloc(all->list, capacity * sizeof *list);
-        if (!list) return false;
-        all->list = list;
-        all->capacity = capacity;
-    }
-    part *p = &all->list[all->count++];
-    *p = *parent;
-    p->item = item;
-    for (uint32_t i = 0; i < item->transform_count; i++) {
-        p->to_parent = pl_affine_multiply(&p->to_parent, &item->transforms[i]->to_parent);
-        p->to_object = pl_affine_multiply(&item->transforms[i]->to_object, &p->to_object);
-        p->stretch *= item->transforms[i]->stretch;
-    }
-    set_box(states, p);
-    return true;
-}
-
-/* The parts of a state, those of no matter what size if there are too many: breadth first, so that all are opened alike. */
-static bool find_parts(const pl_states *states, uint32_t state, parts *all)
-{
-    const double smallest = PARTS * states->list[state].bounds->diameter;
-    const part whole = {.to_parent = pl_affine_identity(), .to_object = pl_affine_identity(), .stretch = 1.0};
-    *all = (parts){0};
-    for (uint32_t i = 0; i < states->list[state].item_count; i++)
-        if (!add_part(states, all, &whole, &states->list[state].items[i])) return false;
-    size_t kept = 0;
-    while (all->head < all->count) {
-        const part p = all->list[all->head++];
-        const pl_state *below = p.item->kind == PL_NODE_ENTER ? &states->list[p.item->what] : NULL;
-        if (!below || below->bounds->diameter * p.stretch <= smallest || all->count - all->head + kept >= MOST_PARTS) {
-            all->list[kept++] = p;
-            continue;
-        }
-        for (uint32_t i = 0; i < below->item_count; i++)
-            if (!add_part(states, all, &p, &below->items[i])) return false;
-    }
-    all->count = kept;
-    return true;
-}
-
-/* --- rays --- */
-
-/* Parallel rays: ray i starts at origins[i], on the plane through the box's middle. */
-typedef struct bundle {
-    double d[3];
-    double across[3], up[3];       /* of a point, moved along d onto the plane: its place there, in strata, from the middle */
-    double origins[RAYS][3], enter[RAYS], leave[RAYS]; /* of the box */
-} bundle;
-
-/* Unit vectors along a direction and across it. */
-void pl_coverage_frame(int direction, double s[3], double a[3], double b[3])
-{
-    double square = 0.0, norm = 0.0;
-    for (int axis = 0; axis < 3; axis++) s[axis] = directions[direction][axis], square += s[axis] * s[axis];
-    for (int axis = 0; axis < 3; axis++) s[axis] /= sqrt(square);
-    int least = fabs(s[0]) <= fabs(s[1]) && fabs(s[0]) <= fabs(s[2]) ? 0 : fabs(s[1]) <= fabs(s[2]) ? 1 : 2;
-    for (int axis = 0; axis < 3; axis++) a[axis] = (axis == least) - s[least] * s[axis], norm += a[axis] * a[axis];
-    for (int axis = 0; axis < 3; axis++) a[axis] /= sqrt(norm);
-    for (int axis = 0; axis < 3; axis++)
-        b[axis] = s[(axis + 1) % 3] * a[(axis + 2) % 3] - s[(axis + 2) % 3] * a[(axis + 1) % 3];
-}
-
-/* Half of the box's width along a unit vector; not 0. */
-static double half_width(const pl_box *box, const double a[3])
-{
-    double sum = 0.0;
-    for (int axis = 0; axis < 3; axis++) sum += 0.5 * (box->hi[axis] - box->lo[axis]) * fabs(a[axis]);
-    return sum > 1e-300 ? sum : 1e-300;
-}
-
-/* [enter, leave] of a box; false: it isn't met. */
-static bool meets_box(const pl_box *box, const double o[3], const double d[3], double *enter, double *leave)
-{
-    for (int axis = 0; axis < 3; axis++) {
-        const double by = 1.0 / d[axis], a = (box->lo[axis] - o[axis]) * by, b = (box->hi[axis] - o[axis]) * by;
-        const double near_t = a < b ? a : b, far_t = a < b ? b : a;
-        if (near_t > *enter) *enter = near_t;
-        if (far_t < *leave) *leave = far_t;
-    }
-    return *enter <= *leave;
-}
-
-/* The bits of its rays that meet the box. */
-static uint64_t make_bundle(const pl_states *states, uint32_t state, int index, int bundles, bundle *made)
-{
-    const pl_box *box = &states->list[state].bounds->box;
-    const int direction = index / (bundles * bundles), at = index % (bundles * bundles);
-    const uint64_t key = pl_mix(state, (uint64_t)index);
-    uint64_t met = 0;
-    double s[3], a[3], b[3];
-    pl_coverage_frame(direction, s, a, b);
-    const double p = TURN * ((at % bundles + pl_unit(pl_mix(key, 2 * RAYS))) / bundles - 0.5);
-    const double q = TURN * (((double)(at / bundles) + pl_unit(pl_mix(key, 2 * RAYS + 1))) / bundles - 0.5);
-    const double wide = half_width(box, a), high = half_width(box, b);
-    for (int axis = 0; axis < 3; axis++) {
-        made->d[axis] = s[axis] + p * a[axis] + q * b[axis];
-        made->across[axis] = (a[axis] - p * s[axis]) * (0.5 * SIDE / wide);
-        made->up[axis] = (b[axis] - q * s[axis]) * (0.5 * SIDE / high);
-    }
-    for (int i = 0; i < RAYS; i++) {
-        const double x = wide * (2.0 * (i % SIDE + pl_unit(pl_mix(key, 2 * (uint64_t)i))) / SIDE - 1.0);
-        const double y = high * (2.0 * ((double)(i / SIDE) + pl_unit(pl_mix(key, 2 * (uint64_t)i + 1))) / SIDE - 1.0);
-        for (int axis = 0; axis < 3; axis++)
-            made->origins[i][axis] = 0.5 * (box->lo[axis] + box->hi[axis]) + x * a[axis] + y * b[axis];
-        made->enter[i] = -INFINITY;
-        made->leave[i] = INFINITY;
-        if (meets_box(box, made->origins[i], made->d, &made->enter[i], &made->leave[i])) met |= UINT64_C(1) << i;
-    }
-    return met;
-}
-
-/* The strata that a part's projection touches, along one of the sides. */
-static void touched(const double middle[3], const part *p, const double along[3], int *first, int *last)
-{
-    double at = 0.5 * SIDE, half = 0.0;
-    for (int axis = 0; axis < 3; axis++) at += (p->centre[axis] - middle[axis]) * along[axis];
-    for (int k = 0; k < 3; k++)
-        half += fabs(p->half[k][0] * along[0] + p->half[k][1] * along[1] + p->half[k][2] * along[2]);
-    const double lo = floor(at - half), hi = floor(at + half);
-    *first = lo > 0.0 ? lo < SIDE ? (int)lo : SIDE : 0;
-    *last = hi < SIDE - 1 ? hi >= 0.0 ? (int)hi : -1 : SIDE - 1;
-}
-
-static bool meets_part(const pl_states *states, const part *p, const double o[3], const double d[3], double enter,
-                       double leave)
-{
-    const pl_item *item = p->item;
-    pl_root roots[PL_SHAPE_ROOTS];
-    double at[3];
-    pl_affine_point(&p->to_object, o, at);
-    if (item->kind == PL_NODE_ENTER) return meets_box(&states->list[item->what].bounds->box, at, d, &enter, &leave);
-    if (item->kind == PL_NODE_MESH) return pl_mesh_nearest(states->meshes[item->what], at, d, -INFINITY, INFINITY, roots);
-    return pl_shape_of(item->what)->roots(item->arguments, at, d, -INFINITY, INFINITY, roots) > 0;
-}
-
-static bool add_meeting(meetings *all, meeting m)
-{
-    if (all->count == all->capacity) {
-        size_t capacity = all->capacity ? 2 * all->capacity : 4096;
-        meeting *list = realloc(all->list, capacity * sizeof *list);
-        if (!list) return false;
-        all->list = list;
-        all->capacity = capacity;
-    }
-    all->list[all->count++] = m;
-    return true;
-}
-
-/* Sends a bundle of rays through the parts. */
-static bool send(const pl_states *states, const double middle[3], const parts *all, const bundle *rays, uint16_t index,
-                 meetings *found)
-{
-    uint64_t open = found->counted[index]; /* rays that meet the box and no primitive so far */
-    for (size_t i = 0; i < all->count && open; i++) {
-        const part *p = &all->list[i];
-        int left, right, low, high;
-        touched(middle, p, rays->across, &left, &right);
-        touched(middle, p, rays->up, &low, &high);
-        if (left > right || low > high) continue;
-        double d[3];
-        pl_affine_vector(&p->to_object, rays->d, d);
-        const bool enters = p->item->kind == PL_NODE_ENTER;
-        meeting m = {enters ? p->item->what : 0, index, 0, (uint8_t)pl_coverage_direction(d)};
-        for (int y = low; y <= high; y++)
-            for (int x = left; x <= right; x++) {
-                const int ray = y * SIDE + x;
-                if (!(open >> ray & 1) ||
-                    !meets_part(states, p, rays->origins[ray], d, rays->enter[ray], rays->leave[ray]))
-                    continue;
-                m.ray = (uint8_t)ray;
-                if (!enters) open &= ~(UINT64_C(1) << ray);
-                if (!add_meeting(found, m)) return false;
-            }
-    }
-    return true;
-}
-
-static bool find_meetings(const pl_states *states, uint32_t state, meetings *found)
-{
-    const pl_box *box = &states->list[state].bounds->box;
-    const double middle[3] = {0.5 * (box->lo[0] + box->hi[0]), 0.5 * (box->lo[1] + box->hi[1]),
-                              0.5 * (box->lo[2] + box->hi[2])};
-    parts all;
-    *found = (meetings){0};
-    bool ok = find_parts(states, state, &all);
-    const size_t share = WORK / states->count, work = share < LEAST_WORK ? LEAST_WORK : share > MOST_WORK ? MOST_WORK : share;
-    found->bundles = FEWEST_BUNDLES;
-    while (found->bundles < MOST_BUNDLES && (found->bundles + 1u) * (found->bundles + 1u) * all.count <= work) found->bundles++;
-    for (uint16_t i = 0; ok && i < PL_COVERAGE_DIRECTIONS * found->bundles * found->bundles; i++) {
-        bundle rays;
-        found->counted[i] = make_bundle(states, state, i, found->bundles, &rays);
-        ok = send(states, middle, &all, &rays, i, found);
-    }
-    free(all.list);
-    return ok;
-}
-
 /* --- shares --- */
 
 /* Adds the rays of bundle `index` that are met; *next goes on to the meetings of the bundle after it. */
-static void count_bundle(const shares *table, const meetings *found, int index, size_t *next, double *covered, int *rays)
+static void count_bundle(const shares *table, const pl_meetings *found, int index, size_t *next, double *covered, int *rays)
 {
-    float light[RAYS];
-    for (int k = 0; k < RAYS; k++) light[k] = 1.0f;
+    float light[PL_BUNDLE_RAYS];
+    for (int k = 0; k < PL_BUNDLE_RAYS; k++) light[k] = 1.0f;
     for (; *next < found->count && found->list[*next].bundle == index; ++*next) {
-        const meeting *m = &found->list[*next];
+        const pl_meeting *m = &found->list[*next];
         light[m->ray] *= m->part ? 1.0f - table[m->part].by[m->direction] : 0.0f;
     }
-    for (int k = 0; k < RAYS; k++)
+    for (int k = 0; k < PL_BUNDLE_RAYS; k++)
         if (found->counted[index] >> k & 1) *covered += 1.0 - (double)light[k], ++*rays;
 }
 
 /* A state's shares from those of its parts; returns the largest change. */
-static float evaluate(shares *table, uint32_t state, const meetings *found)
+static float evaluate(shares *table, uint32_t state, const pl_meetings *found)
 {
     shares now = {.most = 0.0f};
     float change = 0.0f;
@@ -375,7 +86,7 @@ static void set_known(pl_coverage *c, uint32_t state)
 typedef struct waiting {
     uint32_t state;
     size_t next;
-    meetings found;
+    pl_meetings found;
 } waiting;
 
 typedef struct wait_stack {
@@ -395,8 +106,8 @@ static bool begin(pl_coverage *c, wait_stack *stack, uint32_t state)
     waiting *w = &stack->list[stack->count++];
     w->state = state;
     w->next = 0;
-    w->found = (meetings){0};
-    return !is_measured(c->states, state) || find_meetings(c->states, state, &w->found);
+    w->found = (pl_meetings){0};
+    return !is_measured(c->states, state) || pl_meetings_find(c->states, state, &w->found);
 }
 
 /* Measures a finite state, those that its parts are first. Each waits for states deeper in the derivation. */
@@ -406,7 +117,7 @@ static bool measure(pl_coverage *c, uint32_t state)
     bool ok = begin(c, &stack, state);
     while (ok && stack.count) {
         waiting *w = &stack.list[stack.count - 1];
-        const meetings *found = &w->found;
+        const pl_meetings *found = &w->found;
         while (w->next < found->count && is_known(c, found->list[w->next].part)) w->next++;
         if (w->next < found->count) {
             ok = begin(c, &stack, found->list[w->next].part);
@@ -426,11 +137,11 @@ static bool measure(pl_coverage *c, uint32_t state)
 static bool measure_endless(pl_coverage *c)
 {
     const pl_states *states = c->states;
-    meetings *found = calloc(states->count, sizeof *found);
+    pl_meetings *found = calloc(states->count, sizeof *found);
     bool ok = found != NULL;
     for (uint32_t i = 0; ok && i < states->count; i++) {
         if (!states->list[i].endless || !is_measured(states, i)) continue;
-        ok = find_meetings(states, i, &found[i]);
+        ok = pl_meetings_find(states, i, &found[i]);
         for (size_t k = 0; ok && k < found[i].count; k++) {
             const uint32_t part = found[i].list[k].part;
             if (!states->list[part].endless && !is_known(c, part)) ok = measure(c, part);
@@ -501,7 +212,7 @@ pl_coverage *pl_coverage_create(pl_states *states, pl_error *error)
         c->shares[i].most = 1.0f;
         atomic_init(&c->known[i], 0);
     }
-    set_known(c, 0); /* which stands for primitives in meetings */
+    set_known(c, 0); /* which stands for primitives in pl_meetings */
     states->bytes += bytes;
     return c;
 }

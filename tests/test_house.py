@@ -17,7 +17,7 @@ LAYERS = [
     ["include/plsys.h", "bytecode.h", "affine.h", "array.h", "random.h", "elementary.h", "double_double.h", "circular.h", "error.h", "box.h", "table.h", "vector.h"],
     ["program.h", "reader.h", "expression.h", "derive_memo.h", "trace.h"],
     ["shapes/*.h"],
-    ["derive.h", "state.h", "reach.h", "coverage.h", "cut.h", "interval.h", "hull.h", "class.h"],
+    ["derive.h", "state.h", "reach.h", "coverage.h", "coverage_rays.h", "cut.h", "interval.h", "hull.h", "class.h"],
     ["scene.h"],
     ["accel/*.h"],
     ["texture.h", "light.h", "camera.h", "shade.h", "shading.h", "quantise.h"],
