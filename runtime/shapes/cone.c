@@ -34,19 +34,24 @@ static bool narrow_to_side(double k, const double o[3], const double d[3], pl_ro
     double discriminant = xw * xw + yw * yw - xy * xy;
     if (isnan(a) || isnan(b) || isnan(c)) return false;
     if (a > 0.0) {
-        if (!(discriminant >= 0.0)) return false;
+        /* Beside the cone and nearly parallel to its side, a and the discriminant's 0 may be nothing but rounding. */
+        if (!(discriminant >= 0.0) || b * b < 0.5 * a * c) return false;
         double q = -(b + copysign(sqrt(discriminant), b));
         double t0 = q / a, t1 = q == 0.0 ? t0 : c / q;
         return narrow(t0 < t1 ? t0 : t1, t0 < t1 ? t1 : t0, enter, leave);
     }
     /* Steeper than the side: inside before the first root or after the second, on different nappes. The nappe with
-     * w >= 0 lies where w grows. */
+     * w >= 0 lies where w grows. A ray parallel to the side has its other root at infinity, where a -> -0 leads; in a
+     * plane that touches the cone it has none. Outside (c > 0) the discriminant is -ac at least, however it rounds. */
     if (w_d == 0.0) return c <= 0.0;
-    double q = -(b + copysign(sqrt(fmax(discriminant, 0.0)), b));
-    double t0 = a == 0.0 ? NAN : q / a, t1 = q == 0.0 ? 0.0 : c / q;
-    if (isnan(t0)) t0 = t1;
-    if (w_d > 0.0) return narrow(a == 0.0 ? t1 : fmax(t0, t1), INFINITY, enter, leave);
-    return narrow(-INFINITY, a == 0.0 ? t1 : fmin(t0, t1), enter, leave);
+    double q = -(b + copysign(sqrt(fmax(discriminant, fmax(-a * c, 0.0))), b));
+    if (q == 0.0) {
+        if (c > 0.0) return false;
+        return w_d > 0.0 ? narrow(0.0, INFINITY, enter, leave) : narrow(-INFINITY, 0.0, enter, leave);
+    }
+    double t0 = a == 0.0 ? -copysign(INFINITY, q) : q / a, t1 = c / q;
+    if (w_d > 0.0) return narrow(fmax(t0, t1), INFINITY, enter, leave);
+    return narrow(-INFINITY, fmin(t0, t1), enter, leave);
 }
 
 static int roots(const double *arguments, const double o[3], const double d[3], double t_min, double t_max,

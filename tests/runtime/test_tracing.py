@@ -79,6 +79,24 @@ def test_each_shape_from_above(shape, arguments, origin, t, normal):
     assert result.primitive.tolist() == [0] and result.depth.tolist() == [0] and result.symbol.tolist() == [-1]
 
 
+@pytest.mark.parametrize("top", [0.0, 0.37, 0.5, 1.5, 3.0])
+def test_rays_parallel_to_the_side_of_a_cone_meet_it_at_most_once(top):
+    """Such a ray's equation has one root. Beside the cone it meets the other nappe, or (in a plane that touches the
+    cone) nothing at all."""
+    slope, steps, random = top - 1, np.arange(-2, 2.25, 0.25), np.random.default_rng(5)
+    places = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+    angles = np.concatenate([np.radians([0, 90, 180, 270, 17, 45, 101]).repeat(len(places)), random.uniform(0, 7, 20000)])
+    across, along = np.stack([np.cos(angles), np.sin(angles), 0 * angles]), np.stack([-np.sin(angles), np.cos(angles), 0 * angles])
+    directions = (slope * across + [[0], [0], [1]]).T * random.choice([-1, 1], (len(angles), 1))
+    touching = (across + along * 5 * random.normal(size=len(angles))).T - directions * random.uniform(-3, 3, (len(angles), 1))
+    origins = np.vstack([np.tile(places, (7, 1)), touching[-20000:]])
+    result = hits(one_shape("cone", top), origins, directions)
+    hit = np.isfinite(result.t)
+    ends = origins[hit] + result.t[hit, None] * directions[hit]
+    assert np.abs(ends[:, 2] - 0.5).max() <= 0.5 + 1e-9
+    assert (np.hypot(ends[:, 0], ends[:, 1]) <= 1 + slope * ends[:, 2] + 1e-6).all()
+
+
 def test_t_counts_directions_and_the_normal_is_mapped_by_the_inverse_transpose():
     squeezed = (2, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0.5, 3)
     result = hits(one_shape("sphere", matrix=squeezed), [[1, 0, 9], [0, -5, 3]], [[0, 0, -2], [0, 0.5, 0]])
