@@ -70,16 +70,20 @@ static place find_place(const pl_binary *tree, uint32_t index)
     return best;
 }
 
+static void fit(pl_binary *node, const pl_binary *tree)
+{
+    node->box = tree[node->left].box;
+    join(&node->box, tree[node->right].box);
+    node->area = area(&node->box);
+}
+
 /* Boxes from a node up, as far as they change. */
 static void refit(pl_binary *tree, uint32_t at)
 {
     for (;; at = tree[at].parent) {
-        bounds box = tree[tree[at].left].box;
-        join(&box, tree[tree[at].right].box);
-        if (memcmp(&box, &tree[at].box, sizeof box) == 0) return;
-        tree[at].box = box;
-        tree[at].area = area(&box);
-        if (at == 0) return;
+        const bounds before = tree[at].box;
+        fit(&tree[at], tree);
+        if (at == 0 || memcmp(&before, &tree[at].box, sizeof before) == 0) return;
     }
 }
 
@@ -100,7 +104,9 @@ static void move(pl_binary *tree, uint32_t node, uint32_t to)
     tree[parent].left = node;
     tree[parent].right = to;
     tree[to].parent = parent;
-    refit(tree, parent);
+    /* Its box may be what it was where it stood before (the node's, if that contains both), and still be news above it. */
+    fit(&tree[parent], tree);
+    refit(tree, tree[parent].parent);
     refit(tree, above);
 }
 
