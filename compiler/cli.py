@@ -14,6 +14,7 @@ import atexit
 import gc
 import importlib
 import sys
+from typing import NoReturn
 
 # Objects made before Python looks for cycles among them. Importing and compiling make some ten thousand, which stay.
 GARBAGE_THRESHOLD = 100_000
@@ -65,7 +66,7 @@ def _forget_garbage() -> None:
 
 def _parser(command: str | None) -> argparse.ArgumentParser:
     """The parser of all commands, with the options of ``command`` only: the others stay unimported."""
-    parser = argparse.ArgumentParser(
+    parser = _ArgumentParser(
         prog="plsys",
         description="A scene language and renderer for things that grow and repeat.",
         epilog=EPILOG,
@@ -85,6 +86,21 @@ def _parser(command: str | None) -> argparse.ArgumentParser:
         sub.add_argument("--json", action="store_true", help="print the facts as one JSON object")
         sub.set_defaults(run=module.run)
     return parser
+
+
+class _ArgumentParser(argparse.ArgumentParser):
+    """Tells wrong arguments as JSON, too, where that is asked for."""
+
+    def parse_known_args(self, args=None, namespace=None):
+        self.json = "--json" in (args or ())
+        return super().parse_known_args(args, namespace)
+
+    def error(self, message: str) -> NoReturn:
+        if self.json:
+            from .commands.common import json_error, print_json
+
+            print_json(json_error("arguments", message))
+        super().error(message)
 
 
 class _Version(argparse.Action):

@@ -36,18 +36,15 @@ def _check(path: str, arguments: argparse.Namespace) -> tuple[dict, bool]:
     except PlsysError as error:
         if not arguments.json:
             print(f"{error.place}: error: {error.reason}", file=sys.stderr)
-        entry = {"code": "unreadable", "severity": "error", "message": error.reason, "line": 1, "column": 1}
-        return {
-            "path": path,
-            "diagnostics": [{**entry, "end_line": 1, "end_column": 1, "hint": ""}],
-            "forecast": None,
-        }, True
+        place = {"line": 1, "column": 1, "end_line": 1, "end_column": 1}
+        entry = {"path": path, "code": "unreadable", "severity": "error", "message": error.reason, **place, "hint": ""}
+        return {"path": path, "diagnostics": [entry], "forecast": None}, True
     failed = any(d.severity == "error" for d in diagnostics)
     if not arguments.json:
         show_diagnostics(diagnostics)
         if prediction is not None and not failed:
             print(f"{path}: {_sentence(prediction)}")
-    rows = [{key: value for key, value in d.as_json().items() if key != "path"} for d in diagnostics]
+    rows = [d.as_json() for d in diagnostics]
     return {"path": path, "diagnostics": rows, "forecast": None if failed else prediction_json}, failed
 
 

@@ -65,13 +65,16 @@ def build_scene(arguments: argparse.Namespace):
 
 
 def read_source(path: str):
-    """The Source at ``path``; PlsysError where it can't be read."""
+    """The Source at ``path``; PlsysError where it can't be read, or is bytecode."""
     from ..reading.source import Source
 
     try:
-        return Source.read(path)
+        source = Source.read(path)
     except OSError as error:
         raise PlsysError(f"can't be read: {error.strerror}", path) from None
+    if source.data.startswith(b"PLSB"):
+        raise PlsysError("is bytecode, which render and disassemble read; this takes the scene's text", path)
+    return source
 
 
 def show_diagnostics(diagnostics) -> None:
@@ -134,4 +137,9 @@ def _print_json_error(
     arguments: argparse.Namespace, place: str, reason: str, diagnostics: tuple[Diagnostic, ...]
 ) -> None:
     if arguments.json:
-        print_json({"error": {"place": place, "reason": reason}, "diagnostics": [d.as_json() for d in diagnostics]})
+        print_json(json_error(place, reason, diagnostics))
+
+
+def json_error(place: str, reason: str, diagnostics: tuple[Diagnostic, ...] = ()) -> dict:
+    """What a command that fails prints with ``--json``."""
+    return {"error": {"place": place, "reason": reason}, "diagnostics": [d.as_json() for d in diagnostics]}

@@ -119,6 +119,34 @@ def test_usage_errors_exit_with_2(arguments, capsys):
     assert code == 2
 
 
+def test_json_tells_wrong_arguments_too(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["render", "scene.plsys", "-o", "x.png", "--size", "4", "--json"])
+    written = capsys.readouterr()
+    told = json.loads(written.out)
+    assert ended.value.code == 2 and told["diagnostics"] == [] and told["error"]["place"] == "arguments"
+    assert "'4' isn't WIDTHxHEIGHT" in told["error"]["reason"] and "'4' isn't WIDTHxHEIGHT" in written.err
+
+
+def test_check_json_names_the_included_file_that_is_wrong(tmp_path, capsys):
+    (tmp_path / "plants.plsys").write_text("Selection A { A -> spher; }\n")
+    (tmp_path / "scene.plsys").write_text('#include "plants.plsys"\n' + CAMERA + "object { A }\n")
+    assert main(["check", str(tmp_path / "scene.plsys"), "--json"]) == 2
+    (entry,) = json.loads(capsys.readouterr().out)["files"]
+    assert Path(entry["path"]).name == "scene.plsys"
+    assert [(Path(d["path"]).name, d["code"], d["line"]) for d in entry["diagnostics"]] == [("plants.plsys", "unknown-name", 1)]
+
+
+@pytest.mark.parametrize("command", ["check", "format", "compile", "export", "compare", "graph"])
+def test_bytecode_where_a_scene_is_needed_is_one_message(command, tmp_path, capsys):
+    bytecode, output = tmp_path / "scene.plsb", {"compile": "x.plsb", "export": "x.obj", "graph": "x.svg"}
+    bytecode.write_bytes(b"PLSB\x01\0\x1b\xf4")
+    options = ["-o", str(tmp_path / output[command])] if command in output else []
+    assert main([command, str(bytecode), *options]) == 2
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 1 and "is bytecode" in told[0]
+
+
 def test_json_tells_errors_too(tmp_path, capsys):
     scene = tmp_path / "scene.plsys"
     scene.write_text(CAMERA + "object { Tre }\nSelection Tree { Tree -> box; }\n")
