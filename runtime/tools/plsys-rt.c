@@ -8,6 +8,7 @@
  * message on standard error and no output file. */
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -224,19 +225,44 @@ static unsigned char *read_file(const char *path, size_t *length)
     return NULL;
 }
 
-/* A new file beside `path`, under a name of its own that is written to `name`. */
-static FILE *create_beside(const char *path, char *name, size_t size)
+/* The file that a picture is written to before it takes its name; "": there is none. */
+static char part[4096];
+
+static void end_by_signal(int number)
+{
+    if (part[0]) unlink(part);
+    signal(number, SIG_DFL);
+    raise(number);
+}
+
+/* A new file beside `path`, under a name of its own: `part`. */
+static FILE *create_beside(const char *path)
 {
     for (int try = 0; try < 100; try++) {
-        if ((size_t)snprintf(name, size, "%s.%ld-%d.part", path, (long)getpid(), try) >= size) {
+        char name[sizeof part];
+        if ((size_t)snprintf(name, sizeof name, "%s.%ld-%d.part", path, (long)getpid(), try) >= sizeof name) {
             errno = ENAMETOOLONG;
             return NULL;
         }
         int descriptor = open(name, O_WRONLY | O_CREAT | O_EXCL, 0666);
-        if (descriptor >= 0) return fdopen(descriptor, "wb");
+        if (descriptor >= 0) {
+            memcpy(part, name, sizeof part);
+            return fdopen(descriptor, "wb");
+        }
         if (errno != EEXIST) return NULL;
     }
     return NULL;
+}
+
+/* What a picture is written to: a device or a pipe itself, which a file must not take the place of. */
+static FILE *create(const char *path)
+{
+    struct stat there;
+    if (stat(path, &there) == 0 && !S_ISREG(there.st_mode)) return fopen(path, "wb");
+    const int signals[] = {SIGHUP, SIGINT, SIGTERM};
+    for (size_t i = 0; i < sizeof signals / sizeof *signals; i++)
+        if (signal(signals[i], end_by_signal) == SIG_IGN) signal(signals[i], SIG_IGN);
+    return create_beside(path);
 }
 
 /* Rows from the bottom up; the -1 says little-endian. */
@@ -281,13 +307,12 @@ static int dump(const arguments *a, const unsigned char *bytes, size_t length)
 
 static int draw(arguments *a, const unsigned char *bytes, size_t length)
 {
-    char part[4096];
     pl_error error;
     pl_scene *scene = pl_scene_create(bytes, length, &a->options, &error);
     if (!scene) return report(a, &error);
     int status = 2;
     float *color = malloc((size_t)a->render.width * (size_t)a->render.height * 3 * sizeof *color);
-    FILE *file = color ? create_beside(a->output, part, sizeof part) : NULL;
+    FILE *file = color ? create(a->output) : NULL;
     int create_error = errno;
     bool quiet = !isatty(STDERR_FILENO);
     if (!quiet) a->render.progress = show_progress;
@@ -299,10 +324,10 @@ static int draw(arguments *a, const unsigned char *bytes, size_t length)
         bool drawn = pl_render(scene, &a->render, &(pl_channels){.color = color}, &error);
         if (!quiet) fputs("\r     \r", stderr);
         bool written = drawn && write_pfm(file, color, a->render.width, a->render.height);
-        written = fclose(file) == 0 && written && rename(part, a->output) == 0;
+        written = fclose(file) == 0 && written && (!part[0] || rename(part, a->output) == 0);
         if (!drawn) report(a, &error);
         else if (!written) complain("%s can't be written: %s", a->output, strerror(errno));
-        if (!written) unlink(part);
+        if (!written && part[0]) unlink(part);
         status = written ? 0 : 2;
     }
     free(color);

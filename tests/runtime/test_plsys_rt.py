@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import struct
+import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +109,34 @@ def test_damaged_bytecode_leaves_no_file(plsys_rt, tree, tmp_path):
     tree.write_bytes(data)
     done = whole.run(plsys_rt, tree, "-o", tmp_path / "x.pfm")
     assert done.returncode == 2 and done.stderr.startswith(f"{tree}: error: ") and done.stderr.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["tree.plsb"]
+
+
+def test_a_device_stays_what_it_is(plsys_rt, tree, tmp_path):
+    """No file takes its place, and what can't be written to it is an error: that of a full one."""
+    full = tmp_path / "full"
+    full.symlink_to("/dev/full")
+    done = whole.run(plsys_rt, tree, "-o", full, "--size", "4x3")
+    assert done.returncode == 2 and done.stderr == f"plsys-rt: error: {full} can't be written: No space left on device\n"
+    assert full.is_char_device()
+
+
+def test_a_pipe_gets_the_picture(plsys_rt, tree, tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = subprocess.Popen(["cat", pipe], stdout=subprocess.PIPE)
+    done = whole.run(plsys_rt, tree, "-o", pipe, "--size", "4x3")
+    assert (done.returncode, done.stderr) == (0, "") and pipe.is_fifo()
+    assert reader.communicate()[0].startswith(b"PF\n4 3\n")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_picture_that_is_broken_off_leaves_no_file(plsys_rt, tree, tmp_path, number):
+    drawing = subprocess.Popen([plsys_rt, tree, "-o", tmp_path / "x.pfm", "--size", "8000x8000", "--antialias", "grid=9"])
+    while drawing.poll() is None and len(list(tmp_path.iterdir())) < 2:
+        time.sleep(0.01)
+    drawing.send_signal(number)
+    assert drawing.wait() == -number
     assert [path.name for path in tmp_path.iterdir()] == ["tree.plsb"]
 
 
