@@ -52,7 +52,8 @@ typedef struct pl_packet_frame {
     unsigned mapped; /* fours of rays that normative is known of */
     uint32_t instance;
     uint32_t answers; /* of the work when t_max and lanes were set last */
-    bool each; /* nodes are told for each ray, by what a pl_frame has … */
+    bool each;  /* nodes are told for each ray, by what a pl_frame has … */
+    bool alike; /* … and the signs of all lanes' directions agree … */
     float near_base[3][PL_LANES], far_base[3][PL_LANES];
     uint32_t near_row[3][PL_LANES];
     pl_beam beam; /* … else for the beam of all lanes */

@@ -222,7 +222,7 @@ static inline bool gated_visit_packet(pl_tracer *tracer, gated_crowd *c)
     for (;;) {
         pl_ref ref;
         unsigned some;
-        if (!go_through_nodes(&way, b, f, &ref, &some, c->queries->error)) return false;
+        if (!go_through_nodes(&way, b, f, c->any, &ref, &some, c->queries->error)) return false;
         const uint32_t kind = ref >> PL_REF_SHIFT;
         if (kind == PL_KIND_RETURN) {
             if (index == 0) break;

@@ -115,7 +115,7 @@ static inline unsigned meet_together(const pl_packet_frame *f, unsigned *lanes, 
         const int child = __builtin_ctz(items);
         lanes_of[child] = lanes_at_child(f, node, child);
     }
-    const __m256i none = _mm256_cmpeq_epi32(_mm256_load_si256((const __m256i *)lanes_of), _mm256_setzero_si256());
+    const __m256i of = _mm256_load_si256((const __m256i *)lanes_of), none = _mm256_cmpeq_epi32(of, _mm256_setzero_si256());
     leave = _mm256_blendv_ps(leave, wide_set(-1.0f), _mm256_castsi256_ps(none));
-    return order_children(enter, leave, node, lanes_of, lanes, entries, own, nearest);
+    return order_children(enter, leave, node, of, lanes, entries, own, nearest);
 }

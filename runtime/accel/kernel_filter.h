@@ -48,8 +48,9 @@ static inline __attribute__((always_inline)) bool shape_interval(uint32_t kind, 
     case PL_SHAPE_DISC:
     case PL_SHAPE_CYLINDER: {
         float a = d[0] * d[0] + d[1] * d[1], r = 1.0f + grow, cross = o[0] * d[1] - o[1] * d[0];
+        if (!inside_quadric(i, a, o[0] * d[0] + o[1] * d[1], a * r * r - cross * cross)) return false;
         between(i, o[2], inverse_of(d[2]), -grow, (kind == PL_SHAPE_CYLINDER ? 1.0f : 0.0f) + grow);
-        return inside_quadric(i, a, o[0] * d[0] + o[1] * d[1], a * r * r - cross * cross);
+        return true;
     }
     case PL_SHAPE_CONE: {
         /* Within a cylinder as wide as the cone's wider end; its side is left to double precision. */
@@ -87,17 +88,17 @@ typedef int64_t long4 __attribute__((vector_size(32), aligned(8), may_alias));
 typedef float float4 __attribute__((vector_size(16), aligned(4), may_alias));
 typedef int32_t int4 __attribute__((vector_size(16), aligned(4), may_alias));
 
-/* Whether a primitive can have a root in (0, t_max) of the frame; with `any`, also whether it must. */
-static inline enum kernel_verdict filter(const pl_front_primitive *p, uint32_t kind, const pl_frame *f, float t_max,
-                                         bool any)
+/* Whether a ray o + t·d of a frame can have a root of a primitive in (0, t_max); with `any`, also whether it must. */
+static inline enum kernel_verdict filter_ray(const pl_front_primitive *p, uint32_t kind, const float from[3], const float to[3],
+                                             float slack, float t_max, bool any)
 {
     if (kind == PL_KIND_MESH || kind == PL_SHAPE_PLANE) return CANDIDATE;
     const float4 x = *(const float4 *)p->columns, y = *(const float4 *)(p->columns + 3);
     const float4 z = *(const float4 *)(p->columns + 6), offset = *(const float4 *)(p->columns + 9);
-    const float4 at = x * f->origin[0] + y * f->origin[1] + (z * f->origin[2] + offset);
-    const float4 along = x * f->direction[0] + y * f->direction[1] + z * f->direction[2];
+    const float4 at = x * from[0] + y * from[1] + (z * from[2] + offset);
+    const float4 along = x * to[0] + y * to[1] + z * to[2];
     const float o[3] = {at[0], at[1], at[2]}, d[3] = {along[0], along[1], along[2]};
-    float margin = p->stretch * f->slack + 0x1p-19f;
+    float margin = p->stretch * slack + 0x1p-19f;
     interval i = {-1e30f, 1e30f};
     if (!shape_interval(kind, p->argument, o, d, margin, &i)) return MISS;
     if (i.enter > i.leave || i.enter > t_max || i.leave < 0.0f) return MISS;
@@ -108,4 +109,9 @@ static inline enum kernel_verdict filter(const pl_front_primitive *p, uint32_t k
     if (kind == PL_SHAPE_CYLINDER && !(d[0] * d[0] + d[1] * d[1] > 1e-30f)) return CANDIDATE;
     if (!(i.enter > 0.0f && margin < 0.25f) || !shape_interval(kind, p->argument, o, d, -margin, &deep)) return CANDIDATE;
     return deep.enter < deep.leave && deep.enter < t_max * 0.9999f ? CERTAIN : CANDIDATE;
+}
+
+static inline enum kernel_verdict filter(const pl_front_primitive *p, uint32_t kind, const pl_frame *f, float t_max, bool any)
+{
+    return filter_ray(p, kind, f->origin, f->direction, f->slack, t_max, any);
 }

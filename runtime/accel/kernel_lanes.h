@@ -68,8 +68,8 @@ static inline bool quadric_lanes(wide_interval *i, unsigned lanes, wide a, wide 
 }
 
 /* As shape_interval, for `lanes`; false: nothing of any of these. */
-static inline bool shape_lanes(uint32_t kind, float argument, unsigned lanes, const wide o[3], const wide d[3], float grow,
-                               wide_interval *i)
+static inline __attribute__((always_inline)) bool shape_lanes(uint32_t kind, float argument, unsigned lanes, const wide o[3],
+                                                             const wide d[3], float grow, wide_interval *i)
 {
     const wide flat = d[0] * d[0] + d[1] * d[1], cross = o[0] * d[1] - o[1] * d[0], along = o[0] * d[0] + o[1] * d[1];
     switch (kind) {
@@ -117,36 +117,49 @@ static inline unsigned certain_lanes(uint32_t kind, const wide o[3], const wide 
     return wide_mask_of(sure);
 }
 
+/* filter_lanes for the lanes of eight that begin at `first`. Not in line: in a loop the primitive's numbers would all be spread
+ * beforehand, more than there are registers for, and most often one eight is all. */
+static __attribute__((noinline)) unsigned filter_half(const pl_front_primitive *p, uint32_t kind, const pl_packet_frame *f,
+                                                       unsigned first, unsigned lanes, unsigned *certain)
+{
+    const float margin = p->stretch * f->slack + 0x1p-19f, *m = p->columns;
+    wide o[3], d[3];
+    const wide x = wide_load(f->origin[0] + first), y = wide_load(f->origin[1] + first);
+    const wide z = wide_load(f->origin[2] + first), u = wide_load(f->direction[0] + first);
+    const wide v = wide_load(f->direction[1] + first), w = wide_load(f->direction[2] + first);
+#pragma GCC unroll 3
+    for (int r = 0; r < 3; r++) {
+        const wide a = wide_set(m[r]), b = wide_set(m[3 + r]), c = wide_set(m[6 + r]);
+        o[r] = wide_multiply_add(a, x, wide_multiply_add(b, y, wide_multiply_add(c, z, wide_set(m[9 + r]))));
+        d[r] = wide_multiply_add(a, u, wide_multiply_add(b, v, c * w));
+    }
+    wide_interval i = {wide_set(-1e30f), wide_set(1e30f)};
+    if (!shape_lanes(kind, p->argument, lanes >> first & 0xFF, o, d, margin, &i)) return 0;
+    const wide t_max = wide_load(f->t_max + first), latest = wide_min(i.leave, t_max);
+    const wide met = wide_and(_mm256_cmp_ps(i.enter, latest, _CMP_LE_OQ), _mm256_cmp_ps(i.leave, wide_set(0.0f), _CMP_GE_OQ));
+    const unsigned eight = wide_mask_of(met) & (lanes >> first & 0xFF);
+    if (certain && eight) *certain |= (eight & certain_lanes(kind, o, d, margin, &i, t_max)) << first;
+    return eight << first;
+}
+
 /* The rays of a packet's frame that can have a root in a primitive; certain: NULL, or those that must. */
 static inline unsigned filter_lanes(const pl_front_primitive *p, uint32_t kind, const pl_packet_frame *f, unsigned lanes,
                                     unsigned *certain)
 {
     if (certain) *certain = 0;
     if (kind == PL_KIND_MESH || kind == PL_SHAPE_PLANE) return lanes;
-    const float margin = p->stretch * f->slack + 0x1p-19f, *m = p->columns;
+    if (!(lanes & (lanes - 1))) { /* as among twigs */
+        const int i = __builtin_ctz(lanes);
+        const float o[3] = {f->origin[0][i], f->origin[1][i], f->origin[2][i]};
+        const float d[3] = {f->direction[0][i], f->direction[1][i], f->direction[2][i]};
+        const enum kernel_verdict verdict = filter_ray(p, kind, o, d, f->slack, f->t_max[i], certain != NULL);
+        if (verdict == CERTAIN) *certain = lanes;
+        return verdict == MISS ? 0 : lanes;
+    }
     unsigned found = 0;
     for (unsigned rest = lanes, first; rest; rest &= ~(0xFFu << first)) {
         first = (unsigned)__builtin_ctz(rest) & ~7u;
-        wide o[3], d[3];
-        const wide x = wide_load(f->origin[0] + first), y = wide_load(f->origin[1] + first);
-        const wide z = wide_load(f->origin[2] + first), u = wide_load(f->direction[0] + first);
-        const wide v = wide_load(f->direction[1] + first), w = wide_load(f->direction[2] + first);
-#pragma GCC unroll 3
-        for (int r = 0; r < 3; r++) {
-            const wide a = wide_set(m[r]), b = wide_set(m[3 + r]), c = wide_set(m[6 + r]);
-            o[r] = wide_multiply_add(a, x, wide_multiply_add(b, y, wide_multiply_add(c, z, wide_set(m[9 + r]))));
-            d[r] = wide_multiply_add(a, u, wide_multiply_add(b, v, c * w));
-        }
-        wide_interval i = {wide_set(-1e30f), wide_set(1e30f)};
-        if (!shape_lanes(kind, p->argument, lanes >> first & 0xFF, o, d, margin, &i)) continue;
-        const wide latest = wide_min(i.leave, wide_load(f->t_max + first));
-        const wide met = wide_and(_mm256_cmp_ps(i.enter, latest, _CMP_LE_OQ),
-                                  _mm256_cmp_ps(i.leave, wide_set(0.0f), _CMP_GE_OQ));
-        const unsigned eight = wide_mask_of(met);
-        found |= eight << first;
-        if (certain && eight & lanes >> first)
-            *certain |= (eight & certain_lanes(kind, o, d, margin, &i, wide_load(f->t_max + first))) << first;
+        found |= filter_half(p, kind, f, first, lanes, certain);
     }
-    if (certain) *certain &= lanes;
-    return found & lanes;
+    return found;
 }

@@ -232,8 +232,9 @@ static void take_answers(pl_packet_frame *f, const pl_bvh_work *w, const pl_quer
             look_along(f);
         }
         f->lanes = left;
+    } else {
+        set_t_max(f, t_max);
     }
-    set_t_max(f, t_max);
 }
 
 /* Goes on with a frame; in line, as it mostly has nothing to do. */
@@ -249,7 +250,7 @@ static inline void go_on_each(pl_packet_frame *f, const pl_bvh_work *w, unsigned
 {
     f->answers = w->answers;
     if (any) f->lanes &= ~lanes | lanes_left(queries, lanes);
-    for (; lanes; lanes &= lanes - 1) {
+    for (; !any && lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
         f->t_max[lane] = t_between(f->t0, t_max[lane], f->rate);
     }
@@ -273,7 +274,7 @@ static inline bool visit_packet(pl_tracer *tracer, unsigned lanes, pl_query *que
     for (;;) {
         pl_ref ref;
         unsigned some;
-        if (!go_through_nodes(&way, w, f, &ref, &some, error)) return false;
+        if (!go_through_nodes(&way, w, f, any, &ref, &some, error)) return false;
         const uint32_t kind = ref >> PL_REF_SHIFT;
         if (kind == PL_KIND_RETURN) {
             if (index == 0) break;

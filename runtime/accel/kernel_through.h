@@ -2,7 +2,7 @@
  *
  *     packet_way way = way_of(w);
  *     push_front(&way, f->front);
- *     while (go_through_nodes(&way, w, f, &ref, &some, error)) …    a primitive, an instance or the way back, for some lanes
+ *     while (go_through_nodes(&way, w, f, any, &ref, &some, error)) …    a primitive, an instance or the way back, for some lanes
  */
 
 /* Where a packet goes on, on the work's stack; pointers to it are kept here, until it grows. */
@@ -26,16 +26,17 @@ static inline __attribute__((always_inline)) void push_front(packet_way *way, co
     way->stack[way->top++] = entry_of(0.0f, front->root);
 }
 
-/* Through nodes to what comes next in a frame: *ref, for *some of its lanes. false: no memory. */
-static inline __attribute__((always_inline)) bool go_through_nodes(packet_way *way, pl_bvh_work *w, const pl_packet_frame *f,
+/* Through nodes to what comes next in a frame: *ref, for *some of its lanes. any: their t_max never changes, so no entry comes to lie
+ * beyond it. false: no memory. */
+static inline __attribute__((always_inline)) bool go_through_nodes(packet_way *way, pl_bvh_work *w, const pl_packet_frame *f, bool any,
                                                                   pl_ref *ref, unsigned *some, pl_error *error)
 {
     for (;;) {
         const uint64_t at = way->stack[--way->top];
         *ref = (pl_ref)at;
         *some = f->lanes & way->own[way->top];
-        if (f->each) *some &= lanes_within(f, at);
-        else if (entry_is_beyond(at, f->most)) continue;
+        if (!any && f->each) *some &= lanes_within(f, at);
+        else if (!any && entry_is_beyond(at, f->most)) continue;
         if (!*some && *ref >> PL_REF_SHIFT != PL_KIND_RETURN) continue;
         for (;;) {
             if (*ref >> PL_REF_SHIFT != PL_KIND_NODE) return true;

@@ -71,6 +71,31 @@ static inline uint32_t entries_within(const uint64_t *entries, uint64_t limit)
 #endif
 }
 
+/* The keys of children whose enter <= leave, the largest first, behind them others; hit: that comparison. */
+static inline __m256i wide_ranks(wide enter, __m256i hit)
+{
+    return wide_sort(_mm256_or_si256(wide_keys(enter), _mm256_xor_si256(hit, _mm256_set1_epi32(-1))));
+}
+
+/* Writes entries of keys and what their lanes number. */
+static inline void wide_store(uint64_t *entries, __m256i refs, __m256i sorted)
+{
+    const __m256i lined = _mm256_permutevar8x32_epi32(refs, sorted);
+    const __m256i low = _mm256_unpacklo_epi32(lined, sorted), high = _mm256_unpackhi_epi32(lined, sorted);
+    _mm256_storeu_si256((__m256i *)entries, _mm256_permute2x128_si256(low, high, 0x20));
+    _mm256_storeu_si256((__m256i *)(entries + 4), _mm256_permute2x128_si256(low, high, 0x31));
+}
+
+/* The number of the child that is met first; hit: those that are met. */
+static inline int wide_nearest(wide enter, __m256i hit)
+{
+    const __m256i least = _mm256_or_si256(wide_keys(enter), _mm256_andnot_si256(hit, _mm256_set1_epi32(INT32_MAX)));
+    __m128i least4 = _mm_min_epi32(_mm256_castsi256_si128(least), _mm256_extracti128_si256(least, 1));
+    least4 = _mm_min_epi32(least4, _mm_shuffle_epi32(least4, 0x4E));
+    least4 = _mm_min_epi32(least4, _mm_shuffle_epi32(least4, 0xB1));
+    return _mm_cvtsi128_si32(least4) & 7;
+}
+
 /* Entries of the children whose enter <= leave, the nearest last; their number. Writes all eight places. No branches. */
 static inline __attribute__((always_inline)) unsigned wide_list(wide enter, wide leave, const pl_ref *child, uint64_t *entries)
 {
@@ -89,12 +114,9 @@ static inline __attribute__((always_inline)) unsigned wide_list(wide enter, wide
 #else
     const __m256i hit = _mm256_castps_si256(_mm256_cmp_ps(enter, leave, _CMP_LE_OQ));
     const unsigned count = (unsigned)__builtin_popcount((unsigned)_mm256_movemask_ps(_mm256_castsi256_ps(hit)));
-    const __m256i sorted = wide_sort(_mm256_or_si256(wide_keys(enter), _mm256_xor_si256(hit, _mm256_set1_epi32(-1))));
+    const __m256i sorted = wide_ranks(enter, hit);
 #endif
-    const __m256i lined = _mm256_permutevar8x32_epi32(refs, sorted);
-    const __m256i low = _mm256_unpacklo_epi32(lined, sorted), high = _mm256_unpackhi_epi32(lined, sorted);
-    _mm256_storeu_si256((__m256i *)entries, _mm256_permute2x128_si256(low, high, 0x20));
-    _mm256_storeu_si256((__m256i *)(entries + 4), _mm256_permute2x128_si256(low, high, 0x31));
+    wide_store(entries, refs, sorted);
     return count;
 }
 
@@ -103,11 +125,7 @@ static inline unsigned wide_order(wide enter, wide leave, const pl_ref *child, u
 {
     const __m256i hit = _mm256_castps_si256(_mm256_cmp_ps(enter, leave, _CMP_LE_OQ));
     const unsigned mask = (unsigned)_mm256_movemask_ps(_mm256_castsi256_ps(hit));
-    const __m256i least = _mm256_or_si256(wide_keys(enter), _mm256_andnot_si256(hit, _mm256_set1_epi32(INT32_MAX)));
-    __m128i least4 = _mm_min_epi32(_mm256_castsi256_si128(least), _mm256_extracti128_si256(least, 1));
-    least4 = _mm_min_epi32(least4, _mm_shuffle_epi32(least4, 0x4E));
-    least4 = _mm_min_epi32(least4, _mm_shuffle_epi32(least4, 0xB1));
-    *nearest = child[_mm_cvtsi128_si32(least4) & 7];
+    *nearest = child[wide_nearest(enter, hit)];
     if ((mask & (mask - 1)) == 0) return mask != 0;
     return wide_list(enter, leave, child, entries);
 }
