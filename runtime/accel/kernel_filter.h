@@ -89,8 +89,9 @@ typedef float float4 __attribute__((vector_size(16), aligned(4), may_alias));
 typedef int32_t int4 __attribute__((vector_size(16), aligned(4), may_alias));
 
 /* Whether a ray o + t·d of a frame can have a root of a primitive in (0, t_max); with `any`, also whether it must. */
-static inline enum kernel_verdict filter_ray(const pl_front_primitive *p, uint32_t kind, const float from[3], const float to[3],
-                                             float slack, float t_max, bool any)
+static inline __attribute__((always_inline)) enum kernel_verdict filter_ray(const pl_front_primitive *p, uint32_t kind,
+                                                                           const float from[3], const float to[3], float slack,
+                                                                           float t_max, bool any)
 {
     if (kind == PL_KIND_MESH || kind == PL_SHAPE_PLANE) return CANDIDATE;
     const float4 x = *(const float4 *)p->columns, y = *(const float4 *)(p->columns + 3);
