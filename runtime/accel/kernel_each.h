@@ -97,14 +97,6 @@ static inline unsigned meet_each(const pl_packet_frame *f, unsigned *lanes, cons
                                  pl_ref *nearest)
 {
     wide first, met;
-    if (!(*lanes & (*lanes - 1))) {
-        wide near[3], far[3], enter, leave;
-        const int lane = __builtin_ctz(*lanes);
-        load_planes(f, lane, node, near, far);
-        meet_lane(f, lane, near, far, &enter, &leave);
-        _mm256_storeu_si256((__m256i *)own, _mm256_set1_epi32((int)*lanes));
-        return wide_order(enter, leave, node->child, entries, nearest);
-    }
     if (f->alike) meet_lanes(f, *lanes, node, true, &first, &met);
     else meet_lanes(f, *lanes, node, false, &first, &met);
     return order_children(first, wide_set(FLT_MAX), node, _mm256_castps_si256(met), lanes, entries, own, nearest);
