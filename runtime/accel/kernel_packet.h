@@ -5,7 +5,7 @@
  * child is met or missed for all rays at once by about twice the arithmetic of one ray (interval arithmetic in packets:
  * Boulos, Wald & Shirley 2006, "Geometric and arithmetic culling methods for entire ray packets"). Below it the rays have
  * spread: nodes are told for each ray (kernel_each.h). Boxes of instances and primitives are told for each ray in either case.
- * Three or fewer go on one by one.
+ * One that is left alone goes on as a single ray.
  *
  * The same filters, wider: candidates are mapped down the path and evaluated as those of single rays are, so packets
  * can't show in hits. */
@@ -17,7 +17,7 @@
 #include "kernel_beam.h"
 
 /* So few go on alone. */
-enum { FEW = 3 };
+enum { FEW = 1 };
 
 /* --- frames --- */
 
