@@ -38,7 +38,7 @@ examples:
   plsys check scenes/*.plsys
   plsys compare scenes/tree.plsys -o difference.png
 
-`plsys COMMAND --help` explains a command. Every command takes --json.
+`plsys COMMAND --help` explains a command. Every command but `lsp` takes --json.
 exit codes: 0 fine, 1 a check failed or pictures differ, 2 bad input."""
 
 
@@ -83,7 +83,10 @@ def _parser(command: str | None) -> argparse.ArgumentParser:
             name, help=summary, description=module.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
         )
         module.add_arguments(sub)
-        sub.add_argument("--json", action="store_true", help="print the facts as one JSON object")
+        if name == "lsp":  # it speaks JSON anyway
+            sub.set_defaults(json=False)
+        else:
+            sub.add_argument("--json", action="store_true", help="print the facts as one JSON object")
         sub.set_defaults(run=module.run)
     return parser
 

@@ -7,6 +7,7 @@ A command's ``run`` raises; :func:`report_errors` prints the message (and, with 
 from __future__ import annotations
 
 import argparse
+import codecs
 import os
 import re
 import sys
@@ -65,7 +66,7 @@ def build_scene(arguments: argparse.Namespace):
 
 
 def read_source(path: str):
-    """The Source at ``path``; PlsysError where it can't be read, or is bytecode."""
+    """The Source at ``path``; PlsysError where it can't be read, or isn't a scene's text."""
     from ..reading.source import Source
 
     try:
@@ -74,6 +75,8 @@ def read_source(path: str):
         raise PlsysError(f"can't be read: {error.strerror}", path) from None
     if source.data.startswith(b"PLSB"):
         raise PlsysError("is bytecode, which render and disassemble read; this takes the scene's text", path)
+    if b"\0" in source.data[:1024] and not _is_utf8(source.data[:1024]):
+        raise PlsysError("isn't text in UTF-8; a scene is", path)
     return source
 
 
@@ -138,6 +141,15 @@ def _print_json_error(
 ) -> None:
     if arguments.json:
         print_json(json_error(place, reason, diagnostics))
+
+
+def _is_utf8(data: bytes) -> bool:
+    """Also where the last character is cut off."""
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(data)
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def json_error(place: str, reason: str, diagnostics: tuple[Diagnostic, ...] = ()) -> dict:

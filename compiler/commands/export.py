@@ -31,6 +31,8 @@ def run(arguments: argparse.Namespace) -> int:
     suffix = Path(arguments.output).suffix.lower()
     if suffix not in FORMATS:
         raise PlsysError(f"don't know the format '{suffix}'; known: {', '.join(FORMATS)}", arguments.output)
+    if arguments.tolerance is not None and suffix != ".obj":
+        raise PlsysError("the tolerance of meshes; POV-Ray gets the shapes as they are", "--tolerance")
     compilation = build_scene(arguments)
     if suffix == ".pov":
         from ..export.povray import export_povray

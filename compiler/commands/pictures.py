@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 FLOAT_FORMATS = (".exr", ".tif", ".tiff", ".hdr", ".pfm")
 
+# Formats of 16-bit integers.
+DEEP_FORMATS = (".png", ".tif", ".tiff")
+
 # Formats that OpenImageIO writes however it was built, so that it needn't be asked.
 USUAL_FORMATS = (".png", ".exr", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".bmp")
 

@@ -123,7 +123,7 @@ def pixels(text: str) -> float:
 def aov_names(text: str) -> tuple[str, ...]:
     from ..reading.diagnostics import nearest
 
-    names = tuple(name for name in text.split(",") if name)
+    names = tuple(text.removesuffix(",").split(","))
     for name in names:
         if name not in AOVS:
             hint = nearest(name, AOVS) or f"known: {', '.join(AOVS)}"
@@ -137,6 +137,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     started = time.perf_counter()
     check_format(arguments.output)
+    _check_options(arguments)
     folder = Path(arguments.output).resolve().parent
     if not folder.is_dir():
         raise PlsysError(f"can't be written: there is no folder '{folder}'", arguments.output)
@@ -173,6 +174,19 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.statistics:
         print("\n".join(render_facts.table(facts)))
     return 0
+
+
+def _check_options(arguments: argparse.Namespace) -> None:
+    """PlsysError where an option says nothing about this picture, so that none is silently ignored."""
+    from .pictures import DEEP_FORMATS
+
+    if arguments.grid and arguments.accel != "grid":
+        raise PlsysError(f"the voxels of --accel grid; this picture is drawn with --accel {arguments.accel}", "--grid")
+    if arguments.front and arguments.accel not in ("auto", "bvh"):
+        raise PlsysError(f"fronts are built by --accel bvh; this picture is drawn with --accel {arguments.accel}", "--front")
+    suffix = Path(arguments.output).suffix.lower()
+    if arguments.linear16 and suffix not in DEEP_FORMATS:
+        raise PlsysError(f"'{suffix}' doesn't hold 16-bit integers; these do: {', '.join(DEEP_FORMATS)}", "--linear16")
 
 
 def _accelerator(arguments: argparse.Namespace) -> str:

@@ -195,3 +195,21 @@ def test_nothing_is_left_of_an_output_that_fails(tmp_path, monkeypatch, capsys):
     assert main(["compile", "scenes/tree.plsys", "-o", str(tmp_path / "tree.plsb")]) == 2
     assert "No space left" in capsys.readouterr().err
     assert list(Path(tmp_path).iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["render", "check", "compile", "export", "format"])
+@pytest.mark.parametrize("data", [b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + bytes(range(256)), "camera {}".encode("utf-16")])
+def test_files_that_are_no_text_are_one_message(tmp_path, capsys, command, data):
+    (tmp_path / "s.plsys").write_bytes(data)
+    output = {"render": "s.png", "compile": "s.plsb", "export": "s.obj"}.get(command)
+    options = ["-o", str(tmp_path / output)] if output else []
+    assert main([command, str(tmp_path / "s.plsys"), *options]) == 2
+    out, err = capsys.readouterr()
+    assert (out + err).count("\n") == 1 and "isn't text in UTF-8" in out + err
+
+
+def test_text_is_text_wherever_the_look_at_it_ends(tmp_path, capsys):
+    scene = tmp_path / "s.plsys"
+    scene.write_bytes(b"// \0" + b"a" * 1019 + "é\nobject { A }\n".encode())  # é is bytes 1024 and 1025
+    assert main(["check", str(scene)]) == 2
+    assert "unknown name 'A'" in capsys.readouterr().err

@@ -95,6 +95,29 @@ def test_tables_for_the_terminal(tmp_path, capsys):
     assert "rays, reflection" not in table
 
 
+@pytest.mark.parametrize(
+    "command, file, options, message",
+    [
+        ("render", "t.png", ["--grid", "4x4x4"], "--grid: error: the voxels of --accel grid"),
+        ("render", "t.png", ["--grid", "4x4x4", "--accel", "boxes"], "drawn with --accel boxes"),
+        ("render", "t.png", ["--front", "21", "--accel", "none"], "--front: error: fronts are built by --accel bvh"),
+        ("render", "t.jpg", ["--linear16"], "--linear16: error: '.jpg' doesn't hold 16-bit integers"),
+        ("render", "t.exr", ["--linear16"], "these do: .png, .tif"),
+        ("export", "t.pov", ["--tolerance", "0.1"], "--tolerance: error: the tolerance of meshes"),
+    ],
+)
+def test_no_option_is_silently_ignored(tmp_path, capsys, command, file, options, message):
+    assert main([command, TREE, "-o", str(tmp_path / file), *options]) == 2
+    assert message in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("names", ["", "depth,,normal", ","])
+def test_a_channel_without_a_name_is_none(tmp_path, capsys, names):
+    with pytest.raises(SystemExit) as end:
+        main(["render", TREE, "-o", str(tmp_path / "t.png"), "--aov", names])
+    assert end.value.code == 2 and "no channel ''" in capsys.readouterr().err
+
+
 def test_small_pictures_start_quickly(tmp_path):
     """Libraries take longer to import than this picture takes to draw, and OpenImageIO and NumPy 36 and 17 MB."""
     code = (
