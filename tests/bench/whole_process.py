@@ -88,7 +88,7 @@ def unique(bench: Bench) -> None:
         )
 
 
-def alone(bench: Bench) -> None:
+def beyond_mitsuba(bench: Bench) -> None:
     """What Mitsuba can't hold: 10^13 cubes, and 10,000 trees that are all different."""
     for case, options in (
         (Case("Menger 10", "menger", {"level": 10}, bench.folder), ("--detail", "1")),
@@ -105,7 +105,7 @@ def alone(bench: Bench) -> None:
 
 def split_by_hand(bench: Bench) -> None:
     """Whole processes, source to picture: plsys against Mitsuba's best form."""
-    alone(bench)
+    beyond_mitsuba(bench)
     if not mitsuba.program():
         return
     ten = Case("order 10", "tree", {"order": 10}, bench.folder)
