@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from common import ALL, SETS, Bench, median, rate, ratios
+from common import ALL, SETS, Bench, rate, ratios
 from prepare import Case
 from report import size
 from turns import alone, ours, take_turns
