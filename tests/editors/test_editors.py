@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -90,11 +91,60 @@ def test_neovim_highlights_and_folds(tmp_path):
     assert {word: seen[word] for word in SEEN} == SEEN
 
 
-def test_emacs(tmp_path):
+def emacs_with_eglot() -> str:
     program = shutil.which("emacs")
     if program is None:
         pytest.skip("Emacs isn't installed: see tests/editors/README.md")
     probe = subprocess.run([program, "-q", "--batch", "--eval", "(progn (package-initialize) (require 'eglot))"], capture_output=True)
     if probe.returncode != 0:
         pytest.skip("this Emacs has no eglot: see tests/editors/README.md")
-    check(run([program, "-q", "--batch", "-l", str(HERE / "session.el")], tmp_path))
+    return program
+
+
+def test_emacs(tmp_path):
+    check(run([emacs_with_eglot(), "-q", "--batch", "-l", str(HERE / "session.el")], tmp_path))
+
+
+def settings(language: str, folder: Path) -> Path:
+    """The set-up in README.md for an editor whose settings are in that language, with a path that exists."""
+    (text,) = re.findall(rf"^```{language}\n(.*?)^```$", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL)
+    program = folder / "plsys"
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} -P -m plsys.compiler.cli "$@"\n')
+    program.chmod(0o755)
+    path = folder / f"init.{language}"
+    path.write_text(text.replace("/path/to/plsys/.venv/bin/plsys", str(program)))
+    assert str(program) in path.read_text()
+    return path
+
+
+def test_neovim_with_the_settings_in_the_readme(tmp_path):
+    program = NEOVIMS["0.11"]
+    if not program.exists():
+        pytest.skip("Neovim 0.11 isn't installed: see tests/editors/README.md")
+    say = (
+        "lua vim.wait(20000, function() return #vim.diagnostic.get(0) > 0 end, 20); io.stdout:write(vim.fn.json_encode({"
+        "diagnostics = vim.diagnostic.get(0), filetype = vim.bo.filetype, hints = vim.lsp.inlay_hint.is_enabled()})"
+        " .. '\\n'); vim.cmd('qall!')"
+    )
+    init = settings("lua", tmp_path)
+    result = run([str(program), "--headless", "-u", str(init), "--cmd", "set noswapfile", "-c", say, "scene.plsys"], tmp_path)
+    assert result["filetype"] == "plsys"
+    assert "did you mean 'Tree'?" in json.dumps(result["diagnostics"])
+    assert result["hints"]
+
+
+def test_emacs_with_the_settings_in_the_readme(tmp_path):
+    program = emacs_with_eglot()
+    say = """(progn
+      (find-file "scene.plsys")
+      (run-hooks 'post-command-hook)
+      (let ((end (+ (float-time) 20)))
+        (while (and (progn (flymake-start) (null (flymake-diagnostics))) (< (float-time) end)) (accept-process-output nil 0.05)))
+      (princ (concat (json-encode `((mode . ,major-mode) (messages . ,(vconcat (mapcar (lambda (each)
+        (substring-no-properties (flymake-diagnostic-text each))) (flymake-diagnostics)))))) "\\n"))
+      (kill-emacs 0))"""
+    init = settings("elisp", tmp_path)
+    start = "(progn (require 'package) (package-initialize) (require 'json) (require 'cl-lib))"
+    result = run([program, "-q", "--batch", "--eval", start, "-l", str(init), "--eval", say], tmp_path)
+    assert result["mode"] == "plsys-mode"
+    assert any("did you mean 'Tree'?" in message for message in result["messages"])
