@@ -7,7 +7,7 @@ import os
 from common import ALL, SETS, Bench, rate, ratios
 from prepare import Case
 from report import size
-from turns import alone, ours, take_turns
+from turns import alone, at_once, ours, take_turns
 
 
 def scatter(bench: Bench) -> None:
@@ -28,7 +28,7 @@ def scatter(bench: Bench) -> None:
 
 
 def threads(bench: Bench) -> None:
-    """Two threads against one, on all cores."""
+    """Two threads against one, on all cores; and two processes, which share nothing: what the machine itself gives."""
     cores = len(os.sched_getaffinity(0))
     for name, scene, parameters in (
         ("order 20", "tree", {"order": 20}),
@@ -45,6 +45,9 @@ def threads(bench: Bench) -> None:
         ]
         if cores > 1:
             bench.results.row(name, "2 threads of 1", ratios(answers[1], answers[0], "coherent"), 1.9)
+            pair = zip(*(answer["sets"]["coherent"]["rates"] for answer in at_once(programs[0], 2, 7)))
+            one = rate(answers[0], "coherent")
+            bench.results.row(name, "2 processes with a thread each, of 1", [sum(rates) / one for rates in pair])
 
 
 def fronts(bench: Bench) -> None:

@@ -84,6 +84,20 @@ def take_turns(programs: list[Program], rounds: int = 3) -> list[dict]:
         return [program.answer(list(lines), numbers) for program, lines in zip(programs, zip(*said))]
 
 
+def at_once(program: Program, count: int, rounds: int) -> list[dict]:
+    """The answers of so many processes of one program, each turn of which all take in the same moments."""
+    numbers = rounds * list(range(len(program.sets)))
+    with contextlib.ExitStack() as stack:
+        running = [stack.enter_context(Running(program)) for _ in range(count)]
+        said = []
+        for number in numbers:
+            for one in running:
+                one.begin(number)
+            said.append([one.line() for one in running])
+        said.append([one.end() for one in running])
+        return [program.answer(list(lines), numbers) for lines in zip(*said)]
+
+
 class Running:
     """A program under way."""
 
@@ -106,9 +120,12 @@ class Running:
         self.process.__exit__(None, None, None)
         self.complaints.close()
 
-    def turn(self, number: int) -> str:
+    def begin(self, number: int) -> None:
         self.process.stdin.write(f"{number}\n")
         self.process.stdin.flush()
+
+    def turn(self, number: int) -> str:
+        self.begin(number)
         return self.line()
 
     def end(self) -> str:
