@@ -302,9 +302,8 @@ typedef struct walk {
     pl_query *query;
     const pl_frame *f; /* frame `frame` of the lane, and its front's nodes */
     const pl_front_node *nodes;
-    uint64_t *stack; /* the lane's */
+    uint64_t *top, *full; /* of the lane's stack; up to `full` there is room for a node's entries */
     uint64_t steps; /* but for nodes */
-    size_t top;
     uint32_t frame, base; /* ends where `base` is left */
     float t_max;       /* in the frame's own t */
 } walk;
@@ -326,19 +325,27 @@ static inline void look(walk *k, uint32_t frame, float t_max)
     k->t_max = t_max;
 }
 
-/* Room for a node's entries. */
-static inline bool make_room(walk *k)
+enum { NODE_ROOM = 16 };
+
+/* A stack whose first entries are known, with room for so many more and for a node's. false: no memory. */
+static inline bool stand(walk *k, size_t top, size_t count)
 {
-    if (__builtin_expect(k->top + 16 <= k->lane->stack_capacity, 1)) return true;
-    if (!pl_bvh_grow_stack(k->lane, k->top, k->query->error)) return false;
-    k->stack = k->lane->stack;
+    if (!pl_bvh_grow_stack(k->lane, top + count, k->query->error)) return false;
+    k->top = k->lane->stack + top;
+    k->full = k->lane->stack + k->lane->stack_capacity - NODE_ROOM;
     return true;
+}
+
+static inline bool make_room(walk *k, size_t count)
+{
+    if (__builtin_expect(k->top + count <= k->full, 1)) return true;
+    return stand(k, (size_t)(k->top - k->lane->stack), count);
 }
 
 /* Leaves out what lies beyond t_max among the ENTRIES_AT_ONCE on top. The way back never does. */
 static inline void pass_beyond(walk *k)
 {
-    const uint32_t within = entries_within(k->stack + k->top - ENTRIES_AT_ONCE, limit_of(k->t_max));
+    const uint32_t within = entries_within(k->top - ENTRIES_AT_ONCE, limit_of(k->t_max));
     k->top -= (size_t)__builtin_clz(within << 1 | 1) + ENTRIES_AT_ONCE - 31;
 }
 
@@ -347,11 +354,10 @@ static inline bool begin(walk *k, bool met)
 {
     const pl_front *front = k->f->front;
     const uint32_t count = front->unbounded_count;
-    if (k->top + count + 16 > k->lane->stack_capacity && !pl_bvh_grow_stack(k->lane, k->top + count, k->query->error)) return false;
-    k->stack = k->lane->stack;
-    k->stack[k->top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
-    for (uint32_t i = 0; i < count; i++) k->stack[k->top++] = entry_of(0.0f, front->unbounded[i]);
-    if (met) k->stack[k->top++] = entry_of(0.0f, front->root);
+    if (!make_room(k, count)) return false;
+    *k->top++ = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
+    for (uint32_t i = 0; i < count; i++) *k->top++ = entry_of(0.0f, front->unbounded[i]);
+    if (met) *k->top++ = entry_of(0.0f, front->root);
     return true;
 }
 
@@ -361,7 +367,7 @@ static inline bool set_off(walk *k, pl_bvh_lane *lane, pl_query *query, uint32_t
     k->lane = lane;
     k->query = query;
     k->steps = 0;
-    k->top = ENTRIES_AT_ONCE; /* pass_beyond reads them */
+    if (!stand(k, ENTRIES_AT_ONCE, 0)) return false; /* pass_beyond reads them */
     memset(lane->stack, 0, ENTRIES_AT_ONCE * sizeof *lane->stack);
     k->base = base;
     look(k, base, local_t_max(&lane->frames[base], query->t_max));
@@ -375,7 +381,7 @@ static inline enum progress go_back(walk *k)
         if (k->frame == k->base) return ENDED;
         look(k, k->frame - 1, local_t_max(k->f - 1, k->query->t_max));
         pass_beyond(k);
-        if ((pl_ref)k->stack[k->top - 1] >> PL_REF_SHIFT != PL_KIND_RETURN) return UNDER_WAY;
+        if ((pl_ref)k->top[-1] >> PL_REF_SHIFT != PL_KIND_RETURN) return UNDER_WAY;
     }
 }
 
@@ -429,15 +435,15 @@ static inline bool visit(pl_tracer *tracer, walk *k, bool any)
     uint64_t nodes = 0;
     enum progress progress = UNDER_WAY;
     while (progress == UNDER_WAY) {
-        const uint64_t at = k->stack[--k->top];
+        const uint64_t at = *--k->top;
         pl_ref ref = (pl_ref)at;
         if (entry_is_beyond(at, k->t_max)) continue;
         while (ref >> PL_REF_SHIFT == PL_KIND_NODE) {
-            unsigned count = meet_nearest(k->f, k->t_max, &k->nodes[ref], k->stack + k->top, &ref);
+            unsigned count = meet_nearest(k->f, k->t_max, &k->nodes[ref], k->top, &ref);
             nodes++;
             if (count == 0) goto next;
             k->top += count - 1;
-            if (!make_room(k)) return false;
+            if (!make_room(k, 0)) return false;
         }
         progress = take(tracer, k, ref, any);
     next:;

@@ -87,6 +87,22 @@ static inline uint32_t entries_within(const uint64_t *entries, uint64_t limit)
     return within;
 }
 
+/* Which of eight integers don't exceed others. */
+static inline uint32_t wide_at_most(const uint32_t *a, const uint32_t *b)
+{
+    uint32_t set = 0;
+    for (int i = 0; i < 8; i++) set |= (uint32_t)(a[i] <= b[i]) << i;
+    return set;
+}
+
+/* Which of eight references are of a kind. */
+static inline uint32_t wide_of_kind(const pl_ref *refs, uint32_t kind)
+{
+    uint32_t set = 0;
+    for (int i = 0; i < 8; i++) set |= (uint32_t)(refs[i] >> PL_REF_SHIFT == kind) << i;
+    return set;
+}
+
 /* Entries of the children whose enter <= leave, the nearest last; their number. */
 static inline unsigned wide_list(wide enter, wide leave, const pl_ref *child, uint64_t *entries)
 {

@@ -1,13 +1,16 @@
 /* kernel_stream.h - rays that go different ways, a step of each in turn (part of the kernels; kernel.h has the steps).
  *
  * Nobody can foretell what a ray meets next, and a processor that guesses wrong begins again. So each round takes the
- * next entry of every ray and does all nodes one after another without a guess, then what is left, kind by kind; and no
- * ray waits for its own last step. Each ray's steps are those that it takes alone, so streams can't show in hits. */
+ * next entry of every ray and does all nodes one after another without a guess, then what is left, kind by kind; no ray
+ * waits for its own last step, nor for an instance or a primitive to come from memory. Each ray's steps are those that it
+ * takes alone, so streams can't show in hits. */
 
 /* Rays under way, and what each comes to in this round: sets of rays, a bit each. */
 typedef struct crowd {
+    _Alignas(32) pl_ref next[PL_LANES]; /* the entry that each takes next, which stays above the top of its stack … */
+    uint32_t at[PL_LANES], limit[PL_LANES]; /* … and its t, which is beyond above the limit (limit_of) */
     walk walks[PL_LANES];
-    uint32_t left, nodes, instances, primitives, returns;
+    uint32_t left, nodes, instances, primitives, returns, beyond;
     uint64_t steps; /* of all */
 } crowd;
 
@@ -15,73 +18,90 @@ typedef struct crowd {
 #define EACH(i, set) \
     for (uint32_t rest_ = set, i = 0; rest_ && (i = (uint32_t)__builtin_ctz(rest_), true); rest_ &= rest_ - 1)
 
-/* Where the set of a reference's kind lies in the 64 bits of four sets of sixteen rays: nodes, instances, returns, primitives. */
-static const uint8_t SET_OF_KIND[16] = {0, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 48, 16, 32, 48};
-_Static_assert(PL_LANES == 32, "two halves of sixteen");
-
-/* Takes the next entry of some of sixteen rays, which stays above the tops of their stacks. Their four sets. */
-static inline uint64_t sort_half(walk *walks, uint32_t left)
-{
-    uint64_t sets = 0;
-    EACH(i, left) {
-        walk *k = &walks[i];
-        const uint64_t at = k->stack[--k->top];
-        sets |= (uint64_t)!entry_is_beyond(at, k->t_max) << (SET_OF_KIND[(pl_ref)at >> PL_REF_SHIFT] + i);
-    }
-    return sets;
-}
-
-/* A set of all rays of those of the two halves. */
-#define BOTH(low, high, shift) ((uint16_t)((low) >> (shift)) | (uint32_t)((high) >> (shift)) << 16)
-
-/* Takes the next entry of each ray. */
+/* Sorts rays by what they take next, eight at a time. */
 static inline void sort_out(crowd *c)
 {
-    const uint64_t low = sort_half(c->walks, (uint16_t)c->left), high = sort_half(c->walks + 16, c->left >> 16);
-    c->nodes = BOTH(low, high, 0);
-    c->instances = BOTH(low, high, 16);
-    c->returns = BOTH(low, high, 32);
-    c->primitives = BOTH(low, high, 48);
+    uint32_t within = 0;
+    c->nodes = c->instances = c->returns = 0;
+    for (unsigned i = 0; i < PL_LANES; i += 8) {
+        within |= wide_at_most(c->at + i, c->limit + i) << i;
+        c->nodes |= wide_of_kind(c->next + i, PL_KIND_NODE) << i;
+        c->instances |= wide_of_kind(c->next + i, PL_KIND_INSTANCE) << i;
+        c->returns |= wide_of_kind(c->next + i, PL_KIND_RETURN) << i;
+    }
+    within &= c->left;
+    c->beyond = c->left & ~within;
+    c->primitives = within & ~(c->nodes | c->instances | c->returns);
+    c->nodes &= within;
+    c->instances &= within;
+    c->returns &= within;
 }
 
-static inline pl_ref next_of(const walk *k)
+static inline void take_next(crowd *c, unsigned i)
 {
-    return (pl_ref)k->stack[k->top];
+    const uint64_t entry = *--c->walks[i].top;
+    c->next[i] = (pl_ref)entry;
+    c->at[i] = (uint32_t)(entry >> 32);
+}
+
+/* The same after a step that may have changed t_max. */
+static inline void take_next_within(crowd *c, unsigned i)
+{
+    c->limit[i] = (uint32_t)(limit_of(c->walks[i].t_max) >> 32);
+    take_next(c, i);
 }
 
 /* What came of a ray's step. false: an error. */
 static inline bool note(crowd *c, unsigned i, enum progress progress)
 {
-    if (progress == UNDER_WAY) return true;
+    if (progress == UNDER_WAY) {
+        take_next_within(c, i);
+        return true;
+    }
     c->steps += c->walks[i].steps;
     c->left &= ~(1u << i);
     return progress != FAILED;
+}
+
+/* Has instances and primitives brought from memory while nodes are done. Inline, since compilers take out calls of functions
+ * that do nothing else. */
+static inline __attribute__((always_inline)) void fetch_items(const crowd *c)
+{
+    enum { LINE = 64 };
+    _Static_assert(sizeof(pl_front_instance) == LINE && sizeof(pl_front_primitive) == LINE, "a line of the cache each");
+    EACH(i, c->instances | c->primitives) {
+        const pl_front *front = c->walks[i].f->front;
+        const char *list = c->instances >> i & 1 ? (const char *)front->instances : (const char *)front->primitives;
+        __builtin_prefetch(list + LINE * (size_t)(c->next[i] & PL_REF_INDEX));
+    }
 }
 
 /* One step of each ray. false: an error. */
 static inline bool make_round(pl_tracer *tracer, crowd *c, bool any)
 {
     sort_out(c);
+    fetch_items(c);
     EACH(i, c->nodes) {
         walk *k = &c->walks[i];
-        const pl_front_node *node = &k->nodes[next_of(k)];
+        const pl_front_node *node = &k->nodes[c->next[i]];
         wide enter, leave;
         meet(k->f, k->t_max, node, &enter, &leave);
-        k->top += wide_list(enter, leave, node->child, k->stack + k->top);
-        if (!make_room(k)) return false;
+        k->top += wide_list(enter, leave, node->child, k->top);
+        if (!make_room(k, 0)) return false;
+        take_next(c, i);
     }
     c->steps += (unsigned)__builtin_popcount(c->nodes);
     EACH(i, c->instances) {
-        walk *k = &c->walks[i];
-        if (!note(c, i, go_into(tracer, k, next_of(k) & PL_REF_INDEX))) return false;
+        if (!note(c, i, go_into(tracer, &c->walks[i], c->next[i] & PL_REF_INDEX))) return false;
     }
     EACH(i, c->primitives) {
         walk *k = &c->walks[i];
-        const pl_ref ref = next_of(k);
-        const enum kernel_verdict verdict = judge(tracer, k, ref, any);
-        if (verdict != MISS && !note(c, i, settle_primitive(tracer, k, ref, any && verdict == CERTAIN))) return false;
+        const enum kernel_verdict verdict = judge(tracer, k, c->next[i], any);
+        if (verdict == MISS) take_next(c, i);
+        else if (!note(c, i, settle_primitive(tracer, k, c->next[i], any && verdict == CERTAIN))) return false;
     }
     EACH(i, c->returns) note(c, i, go_back(&c->walks[i]));
+    EACH(i, c->beyond) take_next(c, i);
     return true;
 }
 
@@ -97,6 +117,7 @@ bool STREAM_KERNEL(pl_tracer *tracer, const pl_ray *rays, pl_query *queries, uns
         ok = pl_bvh_grow_frames(lane, 0, queries->error) && pl_bvh_grow_stack(lane, 0, queries->error);
         if (!ok || !begin_root(tracer, lane, &rays[i], &queries[i], &met)) continue;
         ok = set_off(&c.walks[i], lane, &queries[i], 0, met);
+        if (ok) take_next_within(&c, i);
         c.left |= 1u << i;
     }
     const bool any = queries->kind == PL_QUERY_ANY;

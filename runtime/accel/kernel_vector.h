@@ -71,6 +71,28 @@ static inline uint32_t entries_within(const uint64_t *entries, uint64_t limit)
 #endif
 }
 
+/* Which of eight integers don't exceed others. */
+static inline uint32_t wide_at_most(const uint32_t *a, const uint32_t *b)
+{
+    const __m256i from = _mm256_load_si256((const __m256i *)a), most = _mm256_load_si256((const __m256i *)b);
+#ifdef __AVX512VL__
+    return _mm256_cmple_epi32_mask(from, most);
+#else
+    return 0xFF ^ (uint32_t)_mm256_movemask_ps((__m256)_mm256_cmpgt_epi32(from, most));
+#endif
+}
+
+/* Which of eight references are of a kind. */
+static inline uint32_t wide_of_kind(const pl_ref *refs, uint32_t kind)
+{
+    const __m256i kinds = _mm256_srli_epi32(_mm256_load_si256((const __m256i *)refs), PL_REF_SHIFT);
+#ifdef __AVX512VL__
+    return _mm256_cmpeq_epi32_mask(kinds, _mm256_set1_epi32((int)kind));
+#else
+    return (uint32_t)_mm256_movemask_ps((__m256)_mm256_cmpeq_epi32(kinds, _mm256_set1_epi32((int)kind)));
+#endif
+}
+
 /* The keys of children whose enter <= leave, the largest first, behind them others; hit: that comparison. */
 static inline __m256i wide_ranks(wide enter, __m256i hit)
 {
