@@ -14,9 +14,11 @@
 #include "../scene.h"
 
 /* Steps that one ray may take: entries of bvh's stack; nodes of a walk. Far beyond any ray that makes sense, it ends
- * those of scenes in which 2^n equal instances lie in the same place. */
+ * those of scenes in which 2^n equal instances lie in the same place. Tests may lower both. */
+#ifndef PL_LIMIT_RAY_STEPS
 #define PL_LIMIT_RAY_STEPS (UINT64_C(1) << 24)
 #define PL_LIMIT_WALK_STEPS (UINT64_C(1) << 30)
+#endif
 
 typedef enum pl_query_kind { PL_QUERY_NEAREST, PL_QUERY_ANY, PL_QUERY_ALL } pl_query_kind;
 
