@@ -114,16 +114,16 @@ pl_gate pl_gate_at(const pl_gate_box *s, const double o[3], const double d[3], d
         return PL_GATE_OPEN;
     }
     if (pl_box_is_empty(&s->box)) return PL_GATE_MISSED;
-    pl_span own = clip_gate(s, o, d, slack, within);
-    *t_entry = own.enter;
-    if (!(own.enter <= own.leave && own.enter <= t_max)) return PL_GATE_MISSED;
-    bool small = s->diameter * stretch <= footprint->width + footprint->spread * own.enter;
-    if (!small && !(s->endless && s->diameter <= PL_CUT_BLUR * slack)) {
-        *inside = pl_span_below(s, o, d, within);
-        return PL_GATE_OPEN;
-    }
+    /* Boxes below may stick out of this one by a rounding: what they hold is left out only beyond the room for it. */
+    *inside = pl_span_below(s, o, d, within);
+    if (!(inside->enter <= inside->leave && inside->enter <= t_max)) return PL_GATE_MISSED;
+    const pl_span own = clip_gate(s, o, d, slack, within);
+    const bool met = own.enter <= own.leave;
+    *t_entry = met ? own.enter : inside->enter;
+    bool small = s->diameter * stretch <= footprint->width + footprint->spread * *t_entry;
+    if (!small && !(s->endless && s->diameter <= PL_CUT_BLUR * slack)) return PL_GATE_OPEN;
     /* From within, and within the footprint that a ray starts from, nothing is told of the box's sides. */
-    return own.enter > t_min && own.enter > footprint->skip ? PL_GATE_CUT : PL_GATE_MISSED;
+    return met && own.enter <= t_max && own.enter > t_min && own.enter > footprint->skip ? PL_GATE_CUT : PL_GATE_MISSED;
 }
 
 pl_gate pl_gate_of(const pl_states *states, uint32_t state, const double o[3], const double d[3], double stretch,

@@ -69,6 +69,27 @@ def test_every_accelerator_draws_the_same(name):
         assert other["cut"] == counts["cut"]
 
 
+@pytest.mark.parametrize("rest", ["sphere", "[ scale 0.3 ] triangle + [ trans 0 1 0 ] square", "[ trans 0 1 0; scale 0.5 ] sphere"])
+def test_what_no_rounding_can_tell_apart_is_met_by_every_accelerator(rest):
+    """Rays to the point that copies shrink to: boxes there stick out of each other by a rounding."""
+    symbol = "Selection A { A -> [ trans -0.6 -0.1 -0.9; roty 15; scale 0.5 ] A + %s; }\n" % rest
+    data = compiled(view((1, -8, 2), (0, 0, 0)) + symbol + 2 * "object { A }\n")
+    turn = np.radians(15)
+    step = 0.5 * np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
+    point = np.linalg.solve(np.eye(3) - step, [-0.6, -0.1, -0.9])
+    random = np.random.default_rng(1)
+    origins = random.normal(size=(5000, 3)) + point
+    directions = point - origins + random.normal(size=(5000, 3)) * 10 ** random.uniform(-15, -10, (5000, 1))
+    hits = []
+    for accelerator in ACCELERATORS:
+        with Scene(data, accelerator=accelerator) as scene:
+            hits.append(scene.intersect(origins, directions))
+    assert np.count_nonzero(hits[0].depth > 20) > 500
+    for name, found in zip(ACCELERATORS[1:], hits[1:]):
+        for field in ("t", "primitive", "depth", "normal"):
+            np.testing.assert_array_equal(getattr(found, field), getattr(hits[0], field), err_msg=f"{name}: {field}")
+
+
 @pytest.mark.parametrize("name", ["tree", "menger", "palm"])
 def test_a_cut_off_of_a_finite_scene_is_the_same_by_every_accelerator(name):
     data = build(SCENES / f"{name}.plsys").encode()
