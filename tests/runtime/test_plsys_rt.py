@@ -132,7 +132,9 @@ def test_a_pipe_gets_the_picture(plsys_rt, tree, tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_picture_that_is_broken_off_leaves_no_file(plsys_rt, tree, tmp_path, number):
-    drawing = subprocess.Popen([plsys_rt, tree, "-o", tmp_path / "x.pfm", "--size", "8000x8000", "--antialias", "grid=9"])
+    command = [plsys_rt, tree, "-o", tmp_path / "x.pfm", "--size", "8000x8000", "--antialias", "grid=9"]
+    # What ignores a signal hands that on, as shells do to what they put in the background.
+    drawing = subprocess.Popen(command, preexec_fn=lambda: signal.signal(number, signal.SIG_DFL))
     while drawing.poll() is None and len(list(tmp_path.iterdir())) < 2:
         time.sleep(0.01)
     drawing.send_signal(number)
