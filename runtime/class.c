@@ -13,6 +13,7 @@ enum { FEWEST_BUCKETS = 16, FEWEST_COSTLY = 16, MOST_COSTLY = 1 << 14 };
 typedef struct entry {
     struct entry *next;
     uint64_t hash;
+    uint64_t work, worth; /* the nodes visited for it; what is left of them since it was asked for (make_room) */
     uint32_t symbol;
     pl_bounds bounds;
     pl_range live[];
@@ -31,6 +32,7 @@ struct pl_classes {
     entry **buckets;
     costly *costly;
     uint32_t bucket_count, costly_count;
+    uint32_t next_to_empty; /* bucket */
     size_t bytes, limit;
     uint64_t count;
     pl_range *scope, *live;
@@ -60,23 +62,40 @@ pl_classes *pl_classes_create(const pl_program *program, pl_mesh_tree *const *me
     return NULL;
 }
 
-static void empty(pl_classes *c)
+/* Of an entry, with what malloc adds. */
+static size_t entry_bytes(const pl_classes *c, uint32_t symbol)
 {
-    for (uint32_t i = 0; i < c->bucket_count; i++)
-        for (entry *e = c->buckets[i]; e;) {
-            entry *next = e->next;
-            free(e);
-            e = next;
+    return sizeof(entry) + c->program->nodes[symbol].as.symbol.live_count * sizeof(pl_range) + 16;
+}
+
+/* Lets go what is worth no more than so much in a bucket; the rest is worth half. */
+static void empty(pl_classes *c, uint32_t bucket, uint64_t worth)
+{
+    for (entry **at = &c->buckets[bucket], *e; (e = *at);) {
+        if (e->worth > worth) {
+            e->worth /= 2;
+            at = &e->next;
+            continue;
         }
-    memset(c->buckets, 0, c->bucket_count * sizeof *c->buckets);
-    c->bytes = 0;
-    c->count = 0;
+        *at = e->next;
+        c->bytes -= entry_bytes(c, e->symbol);
+        c->count--;
+        free(e);
+    }
+}
+
+/* What took little work and wasn't asked for lately goes first: a class of trees takes thousands of nodes, one of leaves a few. */
+static bool make_room(pl_classes *c, size_t bytes)
+{
+    if (bytes > c->limit) return false;
+    while (c->bytes + bytes > c->limit) empty(c, c->next_to_empty++ & (c->bucket_count - 1), 1);
+    return true;
 }
 
 void pl_classes_free(pl_classes *c)
 {
     if (!c) return;
-    if (c->buckets) empty(c);
+    for (uint32_t i = 0; c->buckets && i < c->bucket_count; i++) empty(c, i, UINT64_MAX);
     pthread_mutex_destroy(&c->lock);
     pl_class_walk_free(c->walk);
     free(c->buckets);
@@ -101,27 +120,26 @@ static uint64_t hash_of(const pl_classes *c, uint32_t symbol, const pl_range *li
     return hash;
 }
 
-static const entry *find(const pl_classes *c, uint32_t symbol, const pl_range *live, uint64_t hash)
+static entry *find(const pl_classes *c, uint32_t symbol, const pl_range *live, uint64_t hash)
 {
     const size_t bytes = c->program->nodes[symbol].as.symbol.live_count * sizeof *live;
-    for (const entry *e = c->buckets[hash & (c->bucket_count - 1)]; e; e = e->next)
+    for (entry *e = c->buckets[hash & (c->bucket_count - 1)]; e; e = e->next)
         if (e->hash == hash && e->symbol == symbol && (!bytes || memcmp(e->live, live, bytes) == 0)) return e;
     return NULL;
 }
 
 /* Where there is no memory the class is bounded again when it is asked for. */
-static void add(pl_classes *c, uint32_t symbol, const pl_range *live, uint64_t hash, const pl_bounds *bounds)
+static void add(pl_classes *c, uint32_t symbol, const pl_range *live, uint64_t hash, const pl_bounds *bounds, uint64_t work)
 {
-    const size_t more = c->program->nodes[symbol].as.symbol.live_count * sizeof *live, bytes = sizeof(entry) + more;
-    if (find(c, symbol, live, hash)) return;
-    if (c->bytes + bytes + 16 > c->limit) empty(c);
-    entry *e = c->bytes + bytes + 16 <= c->limit ? malloc(bytes) : NULL;
+    const size_t bytes = entry_bytes(c, symbol);
+    if (find(c, symbol, live, hash) || !make_room(c, bytes)) return;
+    entry *e = malloc(bytes);
     if (!e) return;
     entry **bucket = &c->buckets[hash & (c->bucket_count - 1)];
-    *e = (entry){.next = *bucket, .hash = hash, .symbol = symbol, .bounds = *bounds};
-    if (more) memcpy(e->live, live, more);
+    *e = (entry){.next = *bucket, .hash = hash, .work = work, .worth = work, .symbol = symbol, .bounds = *bounds};
+    memcpy(e->live, live, c->program->nodes[symbol].as.symbol.live_count * sizeof *live);
     *bucket = e;
-    c->bytes += bytes + 16;
+    c->bytes += bytes;
     c->count++;
 }
 
@@ -144,7 +162,7 @@ static void keep_found(void *context, const pl_class_found *found)
     /* On the coarse grid nothing is final but for the class itself; and what no state's class is, is never asked for. */
     const uint32_t count = c->program->nodes[found->symbol].as.symbol.live_count;
     if (c->grid == PL_GRID_COARSE || !pl_class_is_of_a_state(found->live, count)) return;
-    add(c, found->symbol, found->live, hash_of(c, found->symbol, found->live, 0), found->bounds);
+    add(c, found->symbol, found->live, hash_of(c, found->symbol, found->live, 0), found->bounds, found->work);
 }
 
 static bool follow(pl_classes *c, uint32_t symbol, pl_class_grid grid, pl_bounds *bounds)
@@ -161,13 +179,14 @@ void pl_classes_bound(pl_classes *c, uint32_t symbol, const pl_scope *scope, pl_
     for (uint32_t i = 0; i < c->program->parameter_count; i++) c->scope[i] = pl_range_of(scope->parameters[i]);
     pl_class_of(c->program, symbol, c->scope, PL_GRID_CLASS, c->live);
     const uint64_t hash = hash_of(c, symbol, c->live, 0);
-    const entry *e = find(c, symbol, c->live, hash);
+    entry *e = find(c, symbol, c->live, hash);
     if (e) {
         *bounds = e->bounds;
+        e->worth = e->work;
     } else {
         if (!follow(c, symbol, PL_GRID_FINE, bounds) && !follow(c, symbol, PL_GRID_COARSE, bounds))
             *bounds = pl_bounds_unknown();
-        add(c, symbol, c->live, hash, bounds);
+        add(c, symbol, c->live, hash, bounds, pl_class_walk_visited(c->walk) - before);
     }
     *work += pl_class_walk_visited(c->walk) - before;
     pthread_mutex_unlock(&c->lock);

@@ -100,6 +100,7 @@ typedef struct pl_class_found {
     uint32_t symbol;
     const pl_range *live;
     const pl_bounds *bounds; /* NULL: nothing can be known */
+    uint64_t work;           /* nodes visited for it */
 } pl_class_found;
 
 typedef struct pl_class_walk pl_class_walk;

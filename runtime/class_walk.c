@@ -387,8 +387,9 @@ static void tell(const pl_class_walk *w, void (*found)(void *context, const pl_c
 {
     for (uint32_t i = 0; i < w->cells.count; i++) {
         const cell *c = cell_at(w, i);
-        const bool unknown = (c->busy ? w->work : c->done) - c->discovered > MOST_WORK || (c->busy && w->unknown);
-        pl_class_found fact = {c->symbol, (pl_range *)w->lives.data + c->live, unknown ? NULL : &c->bounds};
+        const uint64_t work = (c->busy ? w->work : c->done) - c->discovered;
+        const bool unknown = work > MOST_WORK || (c->busy && w->unknown);
+        pl_class_found fact = {c->symbol, (pl_range *)w->lives.data + c->live, unknown ? NULL : &c->bounds, work};
         if (unknown || (!c->busy && c->done <= MOST_WORK)) found(w->context, &fact);
     }
 }
