@@ -71,13 +71,23 @@ def _sentence(prediction) -> str:
     if prediction.infinite:
         counts = "endless (ended by the detail cut-off)"
     elif prediction.primitives is None:
-        counts = f"{_short(low)} to {_short(high)} primitives, about {_short(expected)} expected"
+        counts = _range(low, high) if expected is None else f"{_range(low, high)}, about {_short(expected)} expected"
     else:
         kinds = prediction.by_kind or {"primitive": prediction.primitives}
         counts = " and ".join(f"{_short(n)} {_plural(kind, n)}" for kind, n in kinds.items())
-    states = "states not counted" if prediction.states is None else f"{prediction.states:,} states"
+    states = "states not counted"
+    if prediction.states is not None:
+        states = f"{prediction.states:,} {_plural('state', prediction.states)}"
     depth = "no end to its depth" if prediction.depth is None else f"depth {prediction.depth:,}"
     return f"{counts}, {states}, {depth}"
+
+
+def _range(low: int | None, high: int | None) -> str:
+    if low is None:
+        return "primitives not counted"
+    if high is None:
+        return f"{_short(low)} {_plural('primitive', low)} or more"
+    return f"{_short(low)} to {_short(high)} primitives"
 
 
 def _plural(kind: str, count: int) -> str:
@@ -86,10 +96,8 @@ def _plural(kind: str, count: int) -> str:
     return {"box": "boxes", "torus": "tori", "mesh": "meshes"}.get(kind, kind + "s")
 
 
-def _short(count: float | int | None) -> str:
+def _short(count: float | int) -> str:
     """An integer with thousands' commas; a long one as its leading digits and its length."""
-    if count is None:
-        return "unboundedly many"
     if isinstance(count, float):
         return f"{count:,.0f}"
     text = f"{count:,}"

@@ -63,8 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def memory(text: str) -> int:
-    """``64K`` → 65536; K, M and G are powers of 1024."""
-    exponent = "KMG".find(text[-1:].upper()) + 1 if text else 0
+    """``64K`` → 65536; K, M, G and T are powers of 1024."""
+    exponent = "KMGT".find(text[-1:].upper()) + 1 if text else 0
     try:
         size = int(float(text[:-1] if exponent else text) * 1024**exponent)
     except (ValueError, OverflowError):

@@ -170,7 +170,7 @@ class Resolver:
 
     def resolve_inputs(self) -> None:
         inputs = {name: entry for name, entry in self.names.entries.items() if entry.kind == "input"}
-        for name in self.parameters:
+        for name, value in self.parameters.items():
             if name not in inputs:
                 entry = self.names.entries.get(name)
                 what = (
@@ -179,9 +179,9 @@ class Resolver:
                 hint = nearest(name, inputs) or (
                     f"it has: {' '.join(inputs)}" if inputs else "it declares none"
                 )
-                span = Span(self.file.span.source, 0, 0)
+                option = Source.from_text(f"{name}={value:g}", "-D")
                 self.diagnostics.add(
-                    "unknown-name", span, f"{what}, which -D can't set" if entry else what, hint
+                    "unknown-name", Span(option, 0, len(name)), f"{what}, which -D can't set" if entry else what, hint
                 )
         for entry in inputs.values():
             self.names.reporting(lambda: self.constant_of(entry, entry.definition.span), None)

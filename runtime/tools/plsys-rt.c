@@ -106,7 +106,7 @@ static bool parse_detail(const char *text, double *detail)
 /* Bytes, with K, M and G for powers of 1024. */
 static bool parse_size(const char *text, size_t *size)
 {
-    static const char units[] = "KMG";
+    static const char units[] = "KMGT";
     char *after;
     double value = strtod(text, &after);
     if (after == text) return false;

@@ -94,7 +94,10 @@ def test_what_a_picture_needs(text, missing, tmp_path, capsys):
         (["render", "scenes/tree.plsys", "-o", "/dev/null"], "format"),
         (["render", "scenes/tree.plsys", "-o", "scenes"], "scenes: error"),
         (["render", "scenes/tree.plsys", "-o", "x.pgn"], "use .png"),
+        (["render", "scenes/tree.plsys", "-o", "x.png", "-D", "ordr=3"], "-D:1:1: error[unknown-name]: the scene has no Parameter 'ordr'\n 1 | ordr=3\n"),
         (["render", "scenes/tree.plsys", "-o", "x.png", "-D", "ordr=3"], "did you mean 'order'?"),
+        (["render", "scenes/tree.plsys", "-o", "x.png", "--memory", "64"], "KB; 64 bytes are allowed"),
+        (["render", "scenes/terrain.plsys", "-o", "x.png", "--memory", "64K"], "KB; 64 KB are allowed"),
         (["render", "scenes/tree.plsys", "-o", "x.png", "-D", "order=-3"], "from 0 to 2,000"),
         (["compile", "scenes/tree.plsys", "-o", "/dev/null"], "not an ordinary file"),
         (["compile", "scenes/tree.plsys", "-o", "/nowhere/x.plsb"], "can't be written"),
@@ -108,6 +111,11 @@ def test_bad_arguments_are_one_message(arguments, message, capsys):
     told = capsys.readouterr().err
     assert message.replace(",", "") in told.replace(",", ""), told
     assert len([line for line in told.splitlines() if "error" in line]) == 1
+
+
+def test_more_memory_than_there_is_may_be_allowed(tmp_path):
+    """It is a limit, not an order."""
+    assert main(["render", "scenes/tree.plsys", "-o", str(tmp_path / "x.png"), "--size", "8x6", "--memory", "1T"]) == 0
 
 
 @pytest.mark.parametrize("arguments", [["render"], ["nonsense"], ["render", "a", "-o", "b", "--size", "9"], []])

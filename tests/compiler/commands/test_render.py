@@ -16,6 +16,7 @@ from plsys.runtime import Scene
 
 TREE = "scenes/tree.plsys"
 SMALL = ["--size", "48x36"]
+CAMERA = "camera { location <0, -5, 1> sky <0, 0, 1> right <-4/3, 0, 0> look_at 0 }\n"
 
 
 def pixels(path) -> np.ndarray:
@@ -221,6 +222,21 @@ def test_check_json(capsys):
     assert (forecast["states"], forecast["depth"], forecast["infinite"]) == (13, 13, False)
     assert 0 < forecast["bytecode_bytes"] <= 1500
     assert menger["forecast"]["primitives"] == 8000
+
+
+@pytest.mark.parametrize(
+    "symbol, sentence",
+    [
+        ("A -> [ rotz 9 ] sphere + box;", "1 box and 1 sphere, 1 state, depth 1"),
+        ("A -> 1: sphere + box | 1: sphere;", "1 to 2 primitives, about 2 expected, 1 state, depth 1"),
+        ("A -> 1: sphere + [ scale 0.5 ] A | 1: box;", "1 primitive or more, about 2 expected, 1 state, depth 1"),
+    ],
+)
+def test_check_says_what_a_scene_has(symbol, sentence, tmp_path, capsys):
+    scene = tmp_path / "s.plsys"
+    scene.write_text(CAMERA + "Selection A { " + symbol + " }\nobject { A }\n")
+    assert main(["check", str(scene)]) == 0
+    assert capsys.readouterr().out == f"{scene}: {sentence}\n"
 
 
 def test_large_counts_are_decimal_strings(capsys):
