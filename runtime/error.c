@@ -1,6 +1,7 @@
 /* error.c - see error.h. */
 #include "error.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,6 +41,13 @@ bool pl_fail_at(pl_error *error, int code, const pl_program *program, uint32_t n
 bool pl_fail_memory(pl_error *error, const char *what)
 {
     return pl_fail(error, PL_ERROR_MEMORY, what, "out of memory");
+}
+
+bool pl_fail_allowed(pl_error *error, double needed, double allowed)
+{
+    const bool few = allowed < 1024.0; /* as where a unit was forgotten */
+    return pl_fail(error, PL_ERROR_LIMIT, "memory", "this scene needs at least %.0f KB; %.0f %s are allowed",
+                   ceil(needed / 1024.0), few ? allowed : allowed / 1024.0, few ? "bytes" : "KB");
 }
 
 void pl_error_clear(pl_error *error)

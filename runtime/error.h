@@ -18,6 +18,9 @@ bool pl_fail(pl_error *error, int code, const char *place, const char *format, .
 /* "out of memory" while doing `what`; always returns false. */
 bool pl_fail_memory(pl_error *error, const char *what);
 
+/* A scene's states and structures need more bytes than are allowed; always returns false. */
+bool pl_fail_allowed(pl_error *error, double needed, double allowed);
+
 void pl_error_clear(pl_error *error);
 
 /* Room for pl_number_text: "-1.2345678901234567e-308" and a NUL. */

@@ -186,9 +186,9 @@ static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
     const double asked = scene->options.detail;
     const bool cut = asked > 0.0, lazy = scene->accel == &pl_accel_bvh;
     const bool needed = scene->accel->states || cut;
-    if (lazy && !cut && !scene->options.front_items && pl_terrains_build(scene, MOST_STATES)) {
-        scene->accel = &pl_accel_terrain;
-        return true;
+    if (lazy && !cut && !scene->options.front_items) {
+        if (pl_terrains_build(scene, MOST_STATES, error)) scene->accel = &pl_accel_terrain;
+        if (scene->accel == &pl_accel_terrain || error->code != PL_OK) return error->code == PL_OK;
     }
     const uint32_t most = cut ? MOST_STATES_CUT : lazy || !needed ? MOST_STATES : 0;
     if (!pl_states_build(states, scene->program, scene->meshes, scene->accel->node_boxes && !cut, limit, most, &failed)) {
@@ -220,8 +220,7 @@ static bool build_structure(pl_scene *scene, pl_error *error)
 {
     pl_error why = {.code = PL_OK}, ignored;
     if (!scene->accel->build || scene->accel->build(scene, &why)) return true;
-    if ((scene->accel != &pl_accel_bvh && scene->accel != &pl_accel_terrain) || why.code != PL_ERROR_LIMIT ||
-        strcmp(why.place, "memory") != 0) {
+    if (scene->accel != &pl_accel_bvh || why.code != PL_ERROR_LIMIT || strcmp(why.place, "memory") != 0) {
         *error = why;
         return false;
     }

@@ -23,6 +23,7 @@ struct pl_scene {
     size_t mesh_bytes;
     pl_options options;
     size_t memory; /* bytes that states and structures may take */
+    size_t terrain_bytes; /* of them */
     double detail; /* footprints below which instances are cut; 0: only where rounding ends an endless recursion */
     int threads;
     bool all_opaque;

@@ -36,6 +36,12 @@ static double cache_bytes(void)
     return CACHE_SHARE * (double)(size > 0 ? size : DEFAULT_CACHE);
 }
 
+/* What `memory` leaves to fronts and their states beside terrains; 0: they go by the cache. */
+static double memory_of(const pl_scene *scene)
+{
+    return scene->options.memory ? fmax((double)scene->options.memory - (double)scene->terrain_bytes, 1.0) : 0.0;
+}
+
 /* What is there while fronts are built and gone afterwards: states before they are packed, compositions. */
 static double building_bytes(const pl_scene *scene, const pl_compositions *compositions)
 {
@@ -46,7 +52,8 @@ static double building_bytes(const pl_scene *scene, const pl_compositions *compo
 static bool hulls_fit(const pl_scene *scene, const pl_front_plan *plan)
 {
     const double needed = building_bytes(scene, plan->compositions) + plan->estimate + (double)pl_front_hulls_bytes(&scene->states);
-    return scene->options.memory == 0 || needed <= MOST_AT_ONCE * (double)scene->options.memory + SPARE;
+    const double memory = memory_of(scene);
+    return memory == 0.0 || needed <= MOST_AT_ONCE * memory + SPARE;
 }
 
 /* A plan for what the scene's options ask for: so many items; as much as fits into `memory`; or what pays, as far as the
@@ -55,16 +62,16 @@ static bool choose(const pl_scene *scene, const pl_compositions *compositions, d
                    pl_front_plan **plan, pl_error *error)
 {
     const pl_options *options = &scene->options;
-    const double primitives = (double)scene->states.list[0].primitives;
+    const double primitives = (double)scene->states.list[0].primitives, memory = memory_of(scene);
     if (!(*plan = pl_front_plan_create(compositions, NULL, false, error))) return false;
     if (options->front_items) return pl_front_plan_items(*plan, options->front_items, error);
     size_t states;
     if (!pl_states_packed_bytes(&scene->states, &states, error)) return false;
-    const bool fill = options->memory > 0;
+    const bool fill = memory > 0.0;
     double budget = cache_bytes() - (double)states;
     if (fill) {
-        const double at_once = MOST_AT_ONCE * (double)options->memory + SPARE - building_bytes(scene, compositions);
-        budget = share * (fmin((double)options->memory, at_once) - (double)states);
+        const double at_once = MOST_AT_ONCE * memory + SPARE - building_bytes(scene, compositions);
+        budget = share * (fmin(memory, at_once) - (double)states);
     }
     if (primitives * sizeof(pl_front_primitive) < budget) {
         if (!pl_front_plan_items(*plan, UINT64_MAX, error)) return false;
@@ -80,15 +87,15 @@ static bool choose(const pl_scene *scene, const pl_compositions *compositions, d
     fronts->flat_bytes = primitives < 1e17 ? (uint64_t)(primitives * pl_front_plan_flat_bytes()) : UINT64_MAX;
     double floor;
     ok = ok && (*plan = pl_front_plan_create(compositions, &pilot, true, error)) &&
-         pl_front_plan_budget(*plan, budget - (fill ? LINKS_ROOM * (double)options->memory : 0.0), fill, &floor, &fits, error) &&
+         pl_front_plan_budget(*plan, budget - (fill ? LINKS_ROOM * memory : 0.0), fill, &floor, &fits, error) &&
          (fits || !fill || pl_front_plan_budget(*plan, budget, true, &floor, &fits, error));
     pl_pilot_free(&pilot);
     if (!ok || fits) return ok;
     if (!fill) return pl_front_plan_budget(*plan, LEAST_GROWTH * floor, false, &floor, &fits, error);
     const double needed = (double)states + floor / share;
     const double at_once = (building_bytes(scene, compositions) + needed - SPARE) / MOST_AT_ONCE;
-    return pl_fail(error, PL_ERROR_LIMIT, "memory", "this scene needs at least %.0f KB; %.0f KB are allowed",
-                   fmax(needed, at_once) / 1024.0 + 1.0, (double)options->memory / 1024.0);
+    const double beside = (double)scene->options.memory - memory;
+    return pl_fail_allowed(error, fmax(needed, at_once) + beside, memory + beside);
 }
 
 /* --- one front --- */
@@ -155,7 +162,7 @@ static bool build_front(const pl_scene *scene, const pl_front_plan *plan, pl_fro
     if (counts->primitives > PL_REF_INDEX || counts->instances > PL_REF_INDEX || counts->opened > UINT32_MAX)
         return pl_fail(error, PL_ERROR_LIMIT, "memory", "a front of more than %d items", PL_REF_INDEX);
     bool ok = pl_front_open(plan, front, threads, &items, error);
-    const uint64_t room = scene->options.memory ? scene->options.memory / IMPROVING_SHARE : UINT64_MAX;
+    const uint64_t room = scene->options.memory ? (uint64_t)memory_of(scene) / IMPROVING_SHARE : UINT64_MAX;
     improve = improve && ok && items.box_count * PL_FRONT_IMPROVING_BYTES <= room;
     if (ok && !keep(front, &items, threads, improve)) ok = pl_fail_memory(error, "building the fronts");
     pl_front_items_free(&items);
@@ -318,7 +325,7 @@ static bool build_planned(const pl_scene *scene, const pl_compositions *composit
  * other things. */
 static void link_fronts(const pl_scene *scene, pl_fronts *fronts)
 {
-    const size_t memory = scene->options.memory ? scene->options.memory : (size_t)cache_bytes();
+    const size_t memory = (size_t)(scene->options.memory ? memory_of(scene) : cache_bytes());
     for (uint32_t i = 0; i < fronts->count; i++) {
         const size_t taken = scene->states.bytes + fronts->bytes;
         const size_t bytes = taken < memory ? pl_front_link(&fronts->list[i], &scene->states, memory - taken) : 0;
@@ -338,7 +345,7 @@ bool pl_fronts_build(pl_scene *scene, pl_error *error)
     bool ok = compositions && pl_states_packed_bytes(&scene->states, &states, error);
     for (double share = 1.0; ok;) {
         ok = build_planned(scene, compositions, share, fronts, error);
-        const double room = (double)options->memory - (double)states;
+        const double room = memory_of(scene) - (double)states;
         if (!options->memory || options->front_items || (double)fronts->bytes <= room) break;
         share *= SHRINK * room / (double)fronts->bytes;
         if (ok) clear(fronts);

@@ -328,8 +328,7 @@ static bool choose_rungs(building *b, bool *large)
     double bytes;
     if (most) return follow(b, most, large, &bytes) && build_rungs(b, large, most);
     if (options->memory && least > budget)
-        return pl_fail(b->error, PL_ERROR_LIMIT, "memory", "this scene needs at least %.0f KB; %.0f KB are allowed",
-                       ((double)b->scene->states.bytes + least) / 1024.0 + 1.0, (double)options->memory / 1024.0);
+        return pl_fail_allowed(b->error, (double)b->scene->states.bytes + least, (double)options->memory);
     for (most = LARGEST_ITEMS; most >= LEAST_ITEMS; most /= 2) {
         if (!follow(b, most, large, &bytes)) return false;
         if (bytes > budget) continue;

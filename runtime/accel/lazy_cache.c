@@ -84,8 +84,7 @@ static size_t limit_of_half(size_t limit)
 pl_lazy_cache *pl_lazy_cache_create(const pl_scene *scene, size_t limit, pl_error *error)
 {
     if (limit < SMALLEST_BUDGET) {
-        pl_fail(error, PL_ERROR_LIMIT, "states", "memory: states that are unfolded when they are needed take at least %zu bytes in all",
-                taken_of(scene) + SMALLEST_BUDGET);
+        pl_fail_allowed(error, (double)(taken_of(scene) + SMALLEST_BUDGET), (double)scene->memory);
         return NULL;
     }
     pl_lazy_cache *cache = calloc(1, sizeof *cache);

@@ -185,12 +185,8 @@ static void work_destroy(void *work)
 /* Fronts of what isn't terrain, in the memory that terrains leave. */
 static bool build(pl_scene *scene, pl_error *error)
 {
-    const size_t asked = scene->options.memory, taken = scene->terrains->bytes;
-    if (!scene->terrains->fronts) return true;
-    if (asked) scene->options.memory = asked > taken ? asked - taken : 1;
-    const bool ok = pl_fronts_build(scene, error);
-    scene->options.memory = asked;
-    return ok;
+    scene->terrain_bytes = scene->terrains->bytes;
+    return !scene->terrains->fronts || pl_fronts_build(scene, error);
 }
 
 static void destroy(pl_scene *scene)

@@ -180,8 +180,8 @@ bool pl_terrain_derive(const pl_terrain *terrain, pl_terrain_walk *w, uint32_t l
                        pl_terrain_take *take, void *context);
 
 /* Whether the scene has terrains that pay; then it has scene->terrains, and states of what else there is, of which there are
- * no more than most. */
-bool pl_terrains_build(pl_scene *scene, uint32_t most);
+ * no more than most. Terrains that don't fit are an error: unfolded on touch, each triangle has a class of its own. */
+bool pl_terrains_build(pl_scene *scene, uint32_t most, pl_error *error);
 void pl_terrains_free(pl_scene *scene);
 
 /* --- terrain_end.c --- */
@@ -211,8 +211,8 @@ void pl_terrain_end_skip(const pl_terrain *terrain, uint32_t leaf, pl_walk *walk
 
 /* --- terrain_fill.c --- */
 
-/* Derives a terrain into tiles, in at most `limit` bytes. false: it isn't one, or doesn't pay, or doesn't fit. */
-bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit);
+/* Derives a terrain into tiles, in at most `limit` bytes. false: it isn't one, or doesn't pay, or so many bytes are lacking. */
+bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit, double *lacking);
 
 /* --- terrain.c --- */
 

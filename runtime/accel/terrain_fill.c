@@ -436,17 +436,19 @@ static bool finish(const pl_scene *scene, pl_terrain *terrain, const job *j)
 }
 
 /* Room for the tiles, and in the limit for the tree: its boxes while it is built, and nodes that have five children or more. */
-static bool make_room(pl_terrain *terrain, size_t limit)
+static bool make_room(pl_terrain *terrain, size_t limit, double *lacking)
 {
     const size_t a_tile = terrain->stride + sizeof(pl_boxed) + 2 * sizeof(pl_front_node) / 4;
     free(terrain->memory);
     terrain->memory = NULL;
+    if (terrain->tiles > limit / a_tile) *lacking = (double)terrain->tiles * (double)a_tile - (double)limit;
     return terrain->tiles <= PL_REF_INDEX / PL_TERRAIN_CLUSTERS && terrain->tiles <= limit / a_tile &&
            (terrain->memory = allocate_tiles(terrain->tiles * terrain->stride));
 }
 
-bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit)
+bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit, double *lacking)
 {
+    *lacking = 0.0;
     pl_terrain_walk w;
     uint64_t samples = terrain->tiles < FIRST_SAMPLES ? terrain->tiles : FIRST_SAMPLES;
     bool ok = pl_terrain_walk_begin(&w, scene->program), done = false;
@@ -455,7 +457,7 @@ bool pl_terrain_fill(const pl_scene *scene, pl_terrain *terrain, size_t limit)
     while (ok && !done) {
         job j = {.terrain = terrain};
         ok = pl_terrain_common_begin(&j.common, scene->program->parameter_count) && learn(terrain, &w, samples) &&
-             make_room(terrain, limit);
+             make_room(terrain, limit, lacking);
         if (ok) fill(scene, &j);
         ok = ok && !atomic_load(&j.departs);
         done = ok && !atomic_load(&j.differs);

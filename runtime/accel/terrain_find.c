@@ -446,14 +446,17 @@ static bool build_states(pl_scene *scene, pl_terrains *terrains, uint32_t most)
     return !scene->states.list[0].endless;
 }
 
-static bool fill_all(const pl_scene *scene, pl_terrains *terrains)
+/* false without an error: they aren't terrain, or don't pay. */
+static bool fill_all(const pl_scene *scene, pl_terrains *terrains, pl_error *error)
 {
     size_t used = scene->program->bytes + scene->mesh_bytes + scene->states.bytes;
     terrains->bytes = sizeof *terrains + MOST_PLACES * (sizeof *terrains->list + sizeof *terrains->singles);
     for (uint32_t i = 0; i < terrains->count; i++) {
         pl_terrain *terrain = &terrains->list[i];
-        size_t taken = used + terrains->bytes;
-        if (taken >= scene->memory || !pl_terrain_fill(scene, terrain, scene->memory - taken)) return false;
+        const size_t taken = used + terrains->bytes, room = scene->memory > taken ? scene->memory - taken : 0;
+        double lacking;
+        if (!pl_terrain_fill(scene, terrain, room, &lacking))
+            return lacking > 0.0 && pl_fail_allowed(error, (double)scene->memory + lacking, (double)scene->memory);
         terrains->bytes += terrain->tiles * terrain->stride + terrain->node_bytes +
                            terrain->form.slots * terrain->tile_row * sizeof *terrain->classes +
                            scene->program->parameter_count * (sizeof *terrain->end.cells + sizeof *terrain->end.values);
@@ -461,7 +464,7 @@ static bool fill_all(const pl_scene *scene, pl_terrains *terrains)
     return true;
 }
 
-bool pl_terrains_build(pl_scene *scene, uint32_t most)
+bool pl_terrains_build(pl_scene *scene, uint32_t most, pl_error *error)
 {
     if (!has_form(scene->program)) return false;
     pl_terrains *terrains = calloc(1, sizeof *terrains);
@@ -472,7 +475,7 @@ bool pl_terrains_build(pl_scene *scene, uint32_t most)
         ok = list_places(scene, terrains, &walk) && walk.singular == 0;
         pl_walk_end(&walk);
     }
-    ok = ok && (!terrains->fronts || build_states(scene, terrains, most)) && fill_all(scene, terrains);
+    ok = ok && (!terrains->fronts || build_states(scene, terrains, most)) && fill_all(scene, terrains, error);
     scene->terrains = terrains;
     if (ok) return true;
     pl_terrains_free(scene);
