@@ -14,7 +14,7 @@ import atexit
 import gc
 import importlib
 import sys
-from typing import NoReturn
+from typing import Iterable, NoReturn
 
 # Objects made before Python looks for cycles among them. Importing and compiling make some ten thousand, which stay.
 GARBAGE_THRESHOLD = 100_000
@@ -48,7 +48,12 @@ def main(argv: list[str] | None = None) -> int:
     atexit.register(_forget_garbage)
     argv = sys.argv[1:] if argv is None else argv
     parser = _parser(argv[0] if argv else None)
-    arguments = parser.parse_args(argv)
+    if argv and argv[0] not in COMMANDS and not argv[0].startswith("-"):
+        parser.json = "--json" in argv
+        parser.error(f"no command '{argv[0]}': {_meant(argv[0], COMMANDS)}")
+    arguments, rest = parser.parse_known_args(argv)
+    if rest:
+        parser.error(_is_too_much(rest[0], parser.options))
     if not arguments.command:
         parser.print_help()
         return 2
@@ -73,6 +78,7 @@ def _parser(command: str | None) -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action=_Version)
+    parser.options = ["--help", "--version"]
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, summary in COMMANDS.items():
         if name != command:
@@ -88,11 +94,28 @@ def _parser(command: str | None) -> argparse.ArgumentParser:
         else:
             sub.add_argument("--json", action="store_true", help="print the facts as one JSON object")
         sub.set_defaults(run=module.run)
+        parser.options = [name for action in sub._actions for name in action.option_strings]
     return parser
+
+
+def _is_too_much(argument: str, options: list[str]) -> str:
+    """The message for an argument that the command doesn't take."""
+    if not argument.startswith("-"):
+        return f"'{argument}' is one argument too many"
+    name = argument.partition("=")[0]
+    return f"no option '{name}': {_meant(name, options)}"
+
+
+def _meant(name: str, known: Iterable[str]) -> str:
+    from .reading.nearest import nearest
+
+    return nearest(name, known) or f"known: {' '.join(known)}"
 
 
 class _ArgumentParser(argparse.ArgumentParser):
     """Tells wrong arguments as JSON, too, where that is asked for."""
+
+    json = False
 
     def parse_known_args(self, args=None, namespace=None):
         self.json = "--json" in (args or ())

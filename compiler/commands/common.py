@@ -31,7 +31,14 @@ def add_input_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="set a Parameter of the scene; may be given several times",
     )
-    parser.add_argument("--seed", type=int, help="set the random seed instead of global_settings' seed")
+    parser.add_argument("--seed", type=seed, help="set the random seed instead of global_settings' seed")
+
+
+def seed(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' isn't a whole number") from None
 
 
 def parameter(text: str) -> tuple[str, float]:
@@ -118,22 +125,26 @@ def report_errors(arguments: argparse.Namespace, run: Callable[[], int]) -> int:
         # The runtime's errors are a family of their own: it knows nothing of the compiler.
         if not (hasattr(error, "place") and hasattr(error, "reason")):
             raise
-        _print_error(arguments, error.place, error.reason)
+        _print_runtime_error(arguments, error.place, error.reason)
     return 2
 
 
 def _print_error(arguments: argparse.Namespace, place: str, reason: str) -> None:
-    """``place`` is file:line:column where the runtime found something in the source; its line is shown then. Other
-    places (``camera``) stand behind the scene's name."""
-    scene = getattr(arguments, "scene", "")
-    found = re.fullmatch(r"(.*):(\d+):(\d+)", place, re.DOTALL)
-    if not found and place in ("", "camera", "objects"):
-        place = scene or "plsys"
+    place = place or getattr(arguments, "scene", "plsys")
     print(f"{place}: error: {reason}", file=sys.stderr)
+    _print_json_error(arguments, place, reason, ())
+
+
+def _print_runtime_error(arguments: argparse.Namespace, place: str, reason: str) -> None:
+    """``place`` is file:line:column where the runtime found something in the source, whose line is shown; else it is a part of
+    the scene, such as memory."""
+    found = re.fullmatch(r"(.*):(\d+):(\d+)", place, re.DOTALL)
     if found:
+        _print_error(arguments, place, reason)
         for line in excerpt_at(found[1], int(found[2]), int(found[3])):
             print(line, file=sys.stderr)
-    _print_json_error(arguments, place, reason, ())
+    else:
+        _print_error(arguments, "", reason if place in ("camera", "objects") else f"{place}: {reason}")
 
 
 def _print_json_error(

@@ -15,8 +15,14 @@ HOST = "127.0.0.1"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     transport = parser.add_mutually_exclusive_group()
     transport.add_argument("--stdio", action="store_true", help="standard input and output (the default)")
-    transport.add_argument("--tcp", metavar="PORT", type=int, help="one client on a TCP port of this machine")
-    transport.add_argument("--ws", metavar="PORT", type=int, help="one client on a WebSocket of this machine")
+    transport.add_argument("--tcp", metavar="PORT", type=port, help="one client on a TCP port of this machine")
+    transport.add_argument("--ws", metavar="PORT", type=port, help="one client on a WebSocket of this machine")
+
+
+def port(text: str) -> int:
+    if not (text.isdecimal() and int(text) < 65536):
+        raise argparse.ArgumentTypeError(f"'{text}' isn't a port, 0 to 65535")
+    return int(text)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -139,6 +139,10 @@ def excerpt_at(path: str, line: int, column: int) -> list[str]:
     return _excerpt(Span(source, start, start + len(word[0].encode())))
 
 
+# Terminals would obey them.
+_CONTROLS = {code: "\ufffd" for code in (*range(32), 127, *range(128, 160)) if chr(code) != "\t"}
+
+
 def _excerpt(span: Span) -> list[str]:
     (line, column), end = span.start_position, span.end_position
     text = span.source.line_text(line)
@@ -146,4 +150,4 @@ def _excerpt(span: Span) -> list[str]:
     gutter = " " * (len(str(line)) + 2)
     # Tabs stay tabs, so that carets stand under what they mean at any tab width.
     pad = "".join("\t" if c == "\t" else " " for c in text[: column - 1])
-    return [f" {line} | {text}", f"{gutter}| {pad}{'^' * width}"]
+    return [f" {line} | {text.translate(_CONTROLS)}", f"{gutter}| {pad}{'^' * width}"]

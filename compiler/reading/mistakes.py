@@ -245,7 +245,8 @@ def unexpected(reading: Reading, node: Node, context: Node | None = None) -> Dia
     known = re.compile(_KNOWN)
     for match in re.finditer(r".", text):
         if not known.match(match[0]):
-            message = f"the character '{match[0]}' has no meaning here"
+            shown = f"'{match[0]}'" if match[0].isprintable() else f"U+{ord(match[0]):04X}"
+            message = f"the character {shown} has no meaning here"
             return _diagnostic("syntax", _part(reading, node, match), message, "remove it")
     if (opener := _last_open(text)) >= 0:
         start = node.start_byte + len(text[:opener].encode())

@@ -118,6 +118,41 @@ def test_more_memory_than_there_is_may_be_allowed(tmp_path):
     assert main(["render", "scenes/tree.plsys", "-o", str(tmp_path / "x.png"), "--size", "8x6", "--memory", "1T"]) == 0
 
 
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["rendr", "a"], "no command 'rendr': did you mean 'render'?"),
+        (["plant"], "no command 'plant': known: render check format"),
+        (["--verson"], "no option '--verson': did you mean '--version'?"),
+        (["render", "a", "-o", "b.png", "--memry=4M"], "no option '--memry': did you mean '--memory'?"),
+        (["render", "a", "b", "-o", "b.png"], "'b' is one argument too many"),
+        (["lsp", "--tcp", "65536"], "'65536' isn't a port, 0 to 65535"),
+        (["render", "a", "-o", "b.png", "--seed", "x"], "'x' isn't a whole number"),
+    ],
+)
+def test_arguments_that_are_not_known_are_one_message(arguments, message, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    told = capsys.readouterr().err
+    assert ended.value.code == 2 and told.count(": error: ") == 1 and message in told
+
+
+def test_messages_show_no_control_characters(tmp_path, capsys):
+    """Terminals would obey them."""
+    scene = tmp_path / "scene.plsys"
+    scene.write_bytes(b"object { \x1b[31m } // \x9b \xc2\x9b\n")
+    assert main(["check", str(scene)]) == 2
+    told = capsys.readouterr().err
+    assert "U+001B" in told and all(c.isprintable() for c in told.replace("\n", ""))
+
+
+def test_broken_bytecode_is_told_by_its_name(tmp_path, capsys):
+    path = tmp_path / "cut.plsb"
+    path.write_bytes(compile("scenes/tree.plsys")[:100])
+    assert main(["render", str(path), "-o", str(tmp_path / "x.png")]) == 2
+    assert capsys.readouterr().err.startswith(f"{path}: error: bytecode: truncated: 100 bytes")
+
+
 @pytest.mark.parametrize("arguments", [["render"], ["nonsense"], ["render", "a", "-o", "b", "--size", "9"], []])
 def test_usage_errors_exit_with_2(arguments, capsys):
     try:
