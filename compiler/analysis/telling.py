@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 # Said once of a scene, not of each part.
 _MISSING = frozenset(("no-camera", "no-object", "no-light"))
 
-# What isn't sure while a block that can't be read may hold a use.
-_UNSURE = frozenset(("unused", "unreachable"))
+# What isn't sure while a block that can't be read may hold a use, or a camera.
+_UNSURE = frozenset((*_MISSING, "unused", "unreachable"))
 
 # The insights about so many blocks are read in a millisecond or two.
 PIECE = 256
@@ -56,10 +56,13 @@ class _Told:
         scene = self.scene
         is_unsure = not scene.is_complete or any(part.outcome.is_broken for part in self.parts)
         scene.unsure.intersection_update(self.parts)
-        told = set(new) if is_unsure else scene.unsure.union(new)
-        scene.unsure = scene.unsure.union(new) if is_unsure else set()
-        own, general = self._diagnostics(told)
-        findings = [each for each in own if not (is_unsure and each.code in _UNSURE)]
+        if is_unsure:  # and what was said while it was sure is taken back
+            told = {part for part in self.parts if part in new or (part not in scene.unsure and _is_unsure(part))}
+            scene.unsure |= told
+        else:
+            told = scene.unsure.union(new)
+            scene.unsure = set()
+        findings, general = self._diagnostics(told, is_unsure)
         shown = [part for part in new if part.outcome.insights is not None]
         left = sum(part.outcome is None or part.outcome.model is not None for part in scene.parts)
         return Answer(
@@ -73,7 +76,7 @@ class _Told:
             left > 0,
         )
 
-    def _diagnostics(self, told: set[Part]) -> tuple[list[Diagnostic], list[Diagnostic]]:
+    def _diagnostics(self, told: set[Part], is_unsure: bool) -> tuple[list[Diagnostic], list[Diagnostic]]:
         """Those about the blocks of parts that are told, and all those about what parts share."""
         own: list[Diagnostic] = []
         general: dict[tuple, Diagnostic] = {}
@@ -83,8 +86,10 @@ class _Told:
                 continue
             blocks = set(part.blocks)
             for each in part.outcome.diagnostics:
+                if is_unsure and each.code in _UNSURE:
+                    continue
                 if each.code in _MISSING:
-                    if self.scene.is_complete and (part is self.scene.parts.base or each.code == "no-object"):
+                    if part is self.scene.parts.base or each.code == "no-object":
                         missing[each.code] = each
                 elif each.span.source not in blocks:
                     general.setdefault((each.code, each.span.source, each.span.start), each)
@@ -98,6 +103,10 @@ class _Told:
     def _finding(self, d: Diagnostic) -> Finding:
         notes = tuple((*self._place(note.span), note.message) for note in d.notes)
         return Finding(*self._place(d.span), d.code, d.severity, d.message, d.hint, notes)
+
+
+def _is_unsure(part: Part) -> bool:
+    return any(each.code in _UNSURE for each in part.outcome.diagnostics)
 
 
 def _total(parts: Iterable[Part]) -> dict[str, Any] | None:

@@ -7,9 +7,15 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import TYPE_CHECKING
 
-from ..reading.diagnostics import PlsysError
+from ..reading.diagnostics import Diagnostic, PlsysError
+from ..reading.source import Source
 from .common import add_input_arguments, json_integer, print_json, read_source, show_diagnostics
+
+if TYPE_CHECKING:
+    from ..graph.forecast import Forecast
+    from ..pipeline import Compilation
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,12 +32,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _check(path: str, arguments: argparse.Namespace) -> tuple[dict, bool]:
     """The JSON entry of one file, and whether it has errors."""
-    from ..pipeline import diagnose
-
     prediction = None
     try:
         source = read_source(path)
-        diagnostics, compilation, prediction = diagnose(source, dict(arguments.parameters), arguments.seed)
+        diagnostics, compilation, prediction = check_scene(source, dict(arguments.parameters), arguments.seed)
         prediction_json = compilation and _forecast_json(prediction, len(compilation.encode()))
     except PlsysError as error:
         if not arguments.json:
@@ -46,6 +50,22 @@ def _check(path: str, arguments: argparse.Namespace) -> tuple[dict, bool]:
             print(f"{path}: {_sentence(prediction)}")
     rows = [d.as_json() for d in diagnostics]
     return {"path": path, "diagnostics": rows, "forecast": None if failed else prediction_json}, failed
+
+
+def check_scene(
+    source: Source, parameters: dict[str, float] | None = None, seed: float | None = None
+) -> tuple[list[Diagnostic], Compilation | None, Forecast | None]:
+    """As pipeline.diagnose; of a scene with errors it is said what an editor would say."""
+    from ..pipeline import diagnose
+
+    found, compilation, prediction = diagnose(source, parameters, seed)
+    if compilation is None:
+        from ..analysis.saying import messages_about
+
+        said = messages_about(source)
+        if any(each.severity == "error" for each in said):  # else a limit, or a parameter, is what is wrong
+            found = said
+    return found, compilation, prediction
 
 
 def _forecast_json(prediction, bytecode_bytes: int) -> dict:
