@@ -68,6 +68,7 @@ class SceneState:
     request: Request | None = None
     fresh: list[Part] = field(default_factory=list)
     unsure: set[Part] = field(default_factory=set)  # told without what isn't sure
+    partless: set[Block] = field(default_factory=set)  # that were parts of their own; what was said of that has to go
     objects: set[Block] = field(default_factory=set)  # blocks that place something
     including: set[Block] = field(default_factory=set)
     wrong: set[Block] = field(default_factory=set)  # blocks with errors, as far as the server knows
@@ -98,6 +99,8 @@ class SceneState:
         if removed or added:
             self.parts.change(removed, added)
             hand_over(parts, self.parts, removed, added)
+        alone = {part.blocks[0] for part in parts.difference(self.parts) if len(part.blocks) == 1}
+        self.partless = {block for block in self.partless | alone if self.parts.part_of(block) is None}.difference(removed)
         for block in removed:
             block.__dict__["is_gone"] = True
             drop_facts(block)

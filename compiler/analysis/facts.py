@@ -9,6 +9,7 @@ Example: the facts of ``Selection A { A -> C_step A; }`` are one definition (``A
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 # From this size on, a block's tree is made from the tree before the edit; below, a fresh parse is as quick.
 INCREMENTAL_BYTES = 8192
+
+_HEAD = re.compile(rb"(?m)^\W*?(\w+)(?:[ \t]+(\w+))?")
 
 _PLACE = attrgetter("node.span.start", "node.span.end")
 
@@ -95,7 +98,7 @@ class Facts:
     def retouched(self, *others: str) -> None:
         """The text has changed, and with it places in the syntax; ``others`` are properties that did not follow."""
         self.text, self._tree = self.file.span.source.data, None
-        for each in others:
+        for each in ("headwords", *others):
             self.__dict__.pop(each, None)
 
     @lazy_property
@@ -146,6 +149,11 @@ class Facts:
             del words[old]
 
     @lazy_property
+    def headwords(self) -> frozenset[str]:
+        """The first two words of each line, one of which is the name where a line defines something."""
+        return frozenset(word.decode() for line in _HEAD.finditer(self.text) for word in line.groups() if word)
+
+    @lazy_property
     def is_broken(self) -> bool:
         return any([item.severity == "error" for item in self.syntax])
 
@@ -183,7 +191,7 @@ def keep_lost(change: Change) -> None:
     for block in change.removed:
         facts = facts_of(block)
         for each in (*facts.ghosts.values(), *facts.definitions):
-            if each.name not in kept:
+            if each.name not in kept and each.name in facts_of(broken).headwords:
                 facts_of(broken).ghosts[each.name] = each
 
 

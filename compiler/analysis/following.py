@@ -50,6 +50,7 @@ class Following:
         self.general: dict[Block, list[Diagnostic]] = {}  # those about what parts of the scene share
         self.insights: dict[Block, list] = {}  # what they found to show beside the text: see insights.py
         self.is_opening = False  # names aren't known yet: much of a file was never read
+        self._included_by: dict[Document, syntax.Include] = {}
         self._pending = Pending()
         self._earlier = Earlier()
         self._reading: Iterator[None] | None = None
@@ -277,11 +278,15 @@ class Following:
             if each.name.name in self.singles:
                 self.singles[each.name.name][block] = None
 
-    def _position(self, block: Block, definition: Definition) -> tuple[int, int, int]:
-        for i, document in enumerate(self.documents):
+    def _position(self, block: Block, start: int) -> tuple[int, ...]:
+        """Where a place stands in the scene as it is read: what is included stands where the `#include` does."""
+        for document in self.documents:
             if block in document.text.order:
-                return i, document.text.order[block], definition.node.span.start
-        return len(self.documents), 0, 0
+                if document not in self._included_by:
+                    return document.text.order[block], start
+                include = self._included_by[document]
+                return *self._position(include.span.source, include.span.start), document.text.order[block], start
+        return len(self.documents), 0
 
     def _resolve(self, block: Block, places: list[Span] | None = None) -> None:
         self._messages.pop(block, None)

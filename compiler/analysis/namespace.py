@@ -38,10 +38,10 @@ class _Nothing(list):
 
 
 class Namespace:
-    """``position`` tells where a definition stands, so that the first of several counts. What defines, assigns and uses a
+    """``position`` tells where a place of a block stands, so that the first of several counts. What defines, assigns and uses a
     name are facts, which outlive their block's text (retouch.py)."""
 
-    def __init__(self, position: Callable[[Block, Definition], tuple[int, ...]]) -> None:
+    def __init__(self, position: Callable[[Block, int], tuple[int, ...]]) -> None:
         self.definers: dict[str, dict[Facts, list[Definition]]] = {}
         self.writers: dict[str, dict[Facts, list[syntax.Name]]] = {}
         self.users: dict[str, dict[Facts, None]] = {}
@@ -140,6 +140,10 @@ class Namespace:
                     self._unfinished.setdefault(definition.name, {})[facts] = None
                 self._touched[definition.name] = None
 
+    def order_changed(self) -> None:
+        """Of several definitions another one may be the first now."""
+        self._touched.update((name, None) for name, definers in self.definers.items() if len(definers) > 1)
+
     @property
     def is_fresh(self) -> bool:
         return not self._touched
@@ -209,7 +213,7 @@ class Namespace:
         found = [(facts, each) for facts, several in self.definers.get(name, {}).items() for each in several]
         if found:
             if len(found) > 1:
-                found.sort(key=lambda pair: (name in pair[0].ghosts, *self._position(pair[0].block, pair[1])))
+                found.sort(key=lambda pair: (name in pair[0].ghosts, *self._position(pair[0].block, pair[1].node.span.start)))
             return found[0][1].node, found[0][1].kind
         writers = self.writers.get(name)
         return (next(iter(writers.values()))[0], "parameter") if writers else (None, "")

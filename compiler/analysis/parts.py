@@ -88,6 +88,10 @@ class Parts:
         yield self.base
         yield from dict.fromkeys(self._part_of.values())
 
+    def part_of(self, block: Block) -> Part | None:
+        """None for shared blocks that are used."""
+        return self._part_of.get(block)
+
     def change(self, removed: Iterable[Block], added: Iterable[Block]) -> None:
         """Blocks went and came; parts that this touches lose their outcome or are made anew."""
         removed, added = self._exchange(list(removed), list(added))

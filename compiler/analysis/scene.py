@@ -56,7 +56,9 @@ class Scene(Following):
         before = self.documents
         self.documents = []
         self._include_messages.clear()
+        self._included_by.clear()
         self._expand(self.root, [])
+        self._names.order_changed()
         for document in before:
             if document not in self.documents:
                 document.scenes.remove(self)
@@ -72,6 +74,7 @@ class Scene(Following):
         for node in document.includes():
             found = self._include(node, chain)
             if found is not None and found not in self.documents:
+                self._included_by[found] = node
                 self._expand(found, chain)
 
     def _include(self, node: syntax.Include, chain: list[Path]) -> Document | None:
@@ -116,7 +119,7 @@ class Scene(Following):
         """All messages about ``document``, in text order."""
         order, start_at = document.text.order, document.text.start_at
         tables = (self._syntax, self._include_messages, self._messages, self.whole, self.general)
-        unfinished = self._names.users_of_unfinished()
+        unfinished, swallowed = self._names.users_of_unfinished(), self._swallowed_names()
         # By place: resolving by block and the whole-file checks both look for missing files.
         places: dict[tuple[int, str, str], Message] = {}
         for table in tables:
@@ -125,14 +128,20 @@ class Scene(Following):
                     continue
                 base = start_at(index)
                 for each in said:
-                    if table is self._messages and each.code == "unknown-name" and block in unfinished:
-                        continue
+                    if table is self._messages and each.code == "unknown-name":
+                        if block in unfinished or each.span.text in swallowed:
+                            continue
                     start = base + each.span.start
                     places[start, each.code, each.message] = Message(each, start, base + each.span.end)
         found = [*places.values(), *self._second_ones(document)]
         if ignored := self._ignores(document):
             found = [m for m in found if not is_ignored(m.diagnostic.code, m.diagnostic.severity, m.start, ignored)]
         return sorted(found, key=_PLACE)
+
+    def _swallowed_names(self) -> set[str]:
+        """What blocks that can't be read may define: not knowing it is no mistake of its users."""
+        broken = (block for block in self._syntax if facts_of(block).is_broken)
+        return {name for block in broken for name in facts_of(block).headwords}
 
     def _ignores(self, document: Document) -> list[Ignore]:
         """What `plsys-ignore` comments of ``document`` say. One at the end of a block may speak of the next one."""
@@ -152,7 +161,7 @@ class Scene(Following):
                 continue
             nodes = [node for block in blocks for node in facts_of(block).blocks if node.name.name == name]
             places = [(place, node) for node in nodes if (place := self.place(node.name.span)) is not None]
-            places.sort(key=lambda pair: (self.documents.index(pair[0].document), pair[0].start))
+            places.sort(key=lambda pair: self._position(pair[1].span.source, pair[1].span.start))
             for place, node in places[1:]:
                 if place.document is document and node.span.source not in self._syntax:
                     text = f"a second {name} block"

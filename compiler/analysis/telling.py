@@ -64,10 +64,11 @@ class _Told:
             scene.unsure = set()
         findings, general = self._diagnostics(told, is_unsure)
         shown = [part for part in new if part.outcome.insights is not None]
+        silent, scene.partless = scene.partless, set()
         left = sum(part.outcome is None or part.outcome.model is not None for part in scene.parts)
         return Answer(
             key,
-            tuple(self.places[block] for part in told for block in part.blocks),
+            tuple(self.places[block] for blocks in (*(part.blocks for part in told), silent) for block in blocks),
             tuple(map(self._finding, findings)),
             tuple(map(self._finding, general)),
             tuple(each for part in shown for each in placed(part.outcome.insights, self._place)),
