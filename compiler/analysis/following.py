@@ -21,7 +21,7 @@ from ..reading.source import Span
 from .deadline import Deadline
 from .document import Document
 from .earlier import Earlier
-from .facts import Definition, Facts, drop_facts, facts_of, keep_lost
+from .facts import Facts, drop_facts, facts_of, keep_lost
 from .namespace import Namespace
 from .parts import role_of
 from .pending import Pending
