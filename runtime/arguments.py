@@ -109,13 +109,12 @@ def planes(given: Mapping[str, object], pixels: int) -> PlChannels:
 
 
 def callback(progress: Callable[[float], object] | None, raised: list[BaseException]) -> Progress:
-    """A C callback; what Python raises in it cancels and is raised again by the caller."""
-    if progress is None:
-        return Progress()
+    """A C callback; what Python raises in it cancels and is raised again by the caller. There always is one: without it Ctrl-C
+    would wait for the end of the picture."""
 
     def call(_: object, done: float) -> bool:
         try:
-            return progress(done) is not False
+            return progress is None or progress(done) is not False
         except BaseException as error:  # KeyboardInterrupt too: it must not vanish in C
             raised.append(error)
             return False

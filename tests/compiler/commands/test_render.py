@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -222,6 +224,23 @@ def test_check_json(capsys):
     assert (forecast["states"], forecast["depth"], forecast["infinite"]) == (13, 13, False)
     assert 0 < forecast["bytecode_bytes"] <= 1500
     assert menger["forecast"]["primitives"] == 8000
+
+
+def test_a_picture_that_is_interrupted_leaves_the_old_one(tmp_path):
+    """At once, and not only where a progress bar is shown."""
+    old = tmp_path / "t.png"
+    old.write_bytes(b"old")
+    command = [sys.executable, "-m", "plsys.compiler.cli", "render", TREE, "-o", old, "--size", "8000x8000", "--antialias", "grid=9"]
+    drawing = subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
+    )
+    # As soon as the runtime is loaded.
+    while "libplsys" not in Path(f"/proc/{drawing.pid}/maps").read_text():
+        time.sleep(0.01)
+    time.sleep(0.5)
+    drawing.send_signal(signal.SIGINT)
+    assert drawing.communicate(timeout=120)[1] == "plsys: interrupted\n" and drawing.returncode == 130
+    assert list(tmp_path.iterdir()) == [old] and old.read_bytes() == b"old"
 
 
 @pytest.mark.parametrize(
