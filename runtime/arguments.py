@@ -109,13 +109,15 @@ def planes(given: Mapping[str, object], pixels: int) -> PlChannels:
 
 
 def callback(progress: Callable[[float], object] | None, raised: list[BaseException]) -> Progress:
-    """A C callback; what Python raises in it cancels and is raised again by the caller. There always is one: without it Ctrl-C
-    would wait for the end of the picture."""
+    """A C callback; what Python raises in it cancels and is raised again by the caller. There always is one: Python heeds
+    Ctrl-C only while it runs itself (scene.py)."""
 
     def call(_: object, done: float) -> bool:
+        if raised:
+            return False
         try:
             return progress is None or progress(done) is not False
-        except BaseException as error:  # KeyboardInterrupt too: it must not vanish in C
+        except BaseException as error:
             raised.append(error)
             return False
 

@@ -11,6 +11,7 @@ them. A Scene may be used by several threads; after close() every call is a Plsy
 from __future__ import annotations
 
 import ctypes
+import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -26,6 +27,21 @@ if TYPE_CHECKING:
 
 UNKNOWN = 2**64 - 1
 BATCH = 65536
+
+
+@contextmanager
+def _keeping_interrupts(raised: list[BaseException]) -> Iterator[None]:
+    """Ctrl-C is kept in ``raised``. Python raises it before the first line of a function that C calls, where nothing can
+    catch it and ctypes drops it."""
+    is_ours = threading.current_thread() is threading.main_thread()
+    if not is_ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda *_: raised.append(KeyboardInterrupt()))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class Hits(NamedTuple):
@@ -242,7 +258,7 @@ class Scene:
             progress=arguments.callback(progress, raised),
         )
         channels, error = arguments.planes(planes, width * height), PlError()
-        with self._open() as handle:
+        with self._open() as handle, _keeping_interrupts(raised):
             done = library().pl_render(handle, ctypes.byref(options), ctypes.byref(channels), ctypes.byref(error))
         if raised:
             raise raised[0]

@@ -239,7 +239,11 @@ def test_a_picture_that_is_interrupted_leaves_the_old_one(tmp_path):
         time.sleep(0.01)
     time.sleep(0.5)
     drawing.send_signal(signal.SIGINT)
-    assert drawing.communicate(timeout=120)[1] == "plsys: interrupted\n" and drawing.returncode == 130
+    try:
+        told = drawing.communicate(timeout=120)[1]
+    finally:
+        drawing.kill()
+    assert told == "plsys: interrupted\n" and drawing.returncode == 130
     assert list(tmp_path.iterdir()) == [old] and old.read_bytes() == b"old"
 
 
