@@ -139,6 +139,9 @@ class Following:
                     yield
             for change in afresh:
                 yield from self._exchange(change)
+            if self._pending.lost_include:
+                self._pending.lost_include = False
+                self._find_files()
         noted: dict[Facts, set[str]] = {}
         for found in self._names.refresh():
             if found is not None:

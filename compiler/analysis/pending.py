@@ -26,6 +26,7 @@ class Pending:
     def __init__(self) -> None:
         self._changes: dict[_Joined, None] = {}
         self._of: dict[Block, _Joined] = {}  # by the blocks that they add
+        self.lost_include = False  # a block that went unread may have included a file
 
     def __bool__(self) -> bool:
         return bool(self._changes)
@@ -49,6 +50,7 @@ class Pending:
         for block in change.removed:
             if block in joined.added:
                 del joined.added[block], of[block]
+                self.lost_include |= b"include" in block.data
             else:
                 joined.removed[block] = None
         joined.added.update(dict.fromkeys(change.added))

@@ -119,7 +119,8 @@ class Scene(Following):
         """All messages about ``document``, in text order."""
         order, start_at = document.text.order, document.text.start_at
         tables = (self._syntax, self._include_messages, self._messages, self.whole, self.general)
-        unfinished, swallowed = self._names.users_of_unfinished(), self._swallowed_names()
+        unfinished = self._names.users_of_unfinished()
+        swallowed: set[str] | None = None
         # By place: resolving by block and the whole-file checks both look for missing files.
         places: dict[tuple[int, str, str], Message] = {}
         for table in tables:
@@ -129,6 +130,7 @@ class Scene(Following):
                 base = start_at(index)
                 for each in said:
                     if table is self._messages and each.code == "unknown-name":
+                        swallowed = self._swallowed_names() if swallowed is None else swallowed
                         if block in unfinished or each.span.text in swallowed:
                             continue
                     start = base + each.span.start

@@ -150,3 +150,10 @@ def test_what_is_unused_is_not_said_while_a_use_may_be_in_a_broken_block(tmp_pat
     assert "unused" not in str(session.shown())
     session.change("object { Tree", "object { Tree }")
     assert "unused" in str(session.shown())
+
+
+def test_an_include_that_goes_before_its_file_was_read(tmp_path):
+    session = Session(FILES[2], tmp_path)
+    session.change('#include "leaf.plsys"\n', "")
+    assert session.shown() == session.said_by_check()
+    assert len(session.project.scene_of(session.root).documents) == 1
