@@ -54,12 +54,24 @@ static bool narrow_to_side(double k, const double o[3], const double d[3], pl_ro
     return narrow(-INFINITY, fmin(t0, t1), enter, leave);
 }
 
+/* From afar c is lost in the squares that it is the difference of, and with it where a ray that is nearly parallel to the side
+ * meets it. So the ray begins at its point nearest to the origin. */
+static bool narrow_from_afar(double k, const double o[3], const double d[3], pl_root *enter, pl_root *leave)
+{
+    const double s = -(o[0] * d[0] + o[1] * d[1] + o[2] * d[2]) / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    const double near[3] = {o[0] + s * d[0], o[1] + s * d[1], o[2] + s * d[2]};
+    pl_root first = {-INFINITY, SIDE}, second = {INFINITY, SIDE};
+    return narrow_to_side(k, near, d, &first, &second) && narrow(first.t + s, second.t + s, enter, leave);
+}
+
 static int roots(const double *arguments, const double o[3], const double d[3], double t_min, double t_max,
                  pl_root out[PL_SHAPE_ROOTS])
 {
+    const double far = 0x1p10, k = arguments[0] - 1.0;
     pl_root enter = {-INFINITY, SIDE}, leave = {INFINITY, SIDE};
     if (!pl_interval_slab(o[2], d[2], 0.0, 1.0, BOTTOM, TOP, &enter, &leave)) return 0;
-    if (!narrow_to_side(arguments[0] - 1.0, o, d, &enter, &leave)) return 0;
+    const bool is_near = o[0] * o[0] + o[1] * o[1] + o[2] * o[2] < far * far;
+    if (!(is_near ? narrow_to_side : narrow_from_afar)(k, o, d, &enter, &leave)) return 0;
     return pl_interval_roots(enter, leave, t_min, t_max, out);
 }
 

@@ -117,6 +117,20 @@ static void check_solids(void)
     }
 }
 
+/* Rays from afar, as good as parallel to the side of a cone. */
+static void check_cones_from_afar(void)
+{
+    static const double tops[] = {0.0, 0.4, 2.5, 40.0};
+    for (int i = 0; i < 2000; i++) {
+        const double top = tops[i % 4], angle = uniform(0.0, 6.3), distance = exp(uniform(0.0, 18.0)), off = uniform(-1.0, 1.0) * 1e-9;
+        const double d[3] = {(top - 1.0) * cos(angle), (top - 1.0) * sin(angle), 1.0 + (i & 4 ? off : 0.0)};
+        const double way = (i & 8 ? distance : -distance) / sqrt(dot(d, d));
+        double o[3];
+        for (int axis = 0; axis < 3; axis++) o[axis] = uniform(-4.0, 4.0) + way * d[axis];
+        check_solid_ray(PL_SHAPE_CONE, top, o, d, 1.0 + 1e-6 * distance);
+    }
+}
+
 static void check_support(void)
 {
     for (uint32_t id = PL_SHAPE_SPHERE; id < PL_SHAPE_PLANE; id++) {
@@ -224,6 +238,7 @@ static void check_boxes(void)
 int main(void)
 {
     check_solids();
+    check_cones_from_afar();
     check_support();
     check_special_rays();
     check_precision();
