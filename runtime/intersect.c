@@ -24,19 +24,31 @@ typedef struct job {
     size_t failed;
 } job;
 
-static bool set_ray(const job *j, size_t i, pl_ray *ray, pl_error *error)
+/* A direction whose squares leave the range of doubles is traced longer by a power of two: t of the one given are *stretch times the
+ * ray's. */
+static bool stretch_direction(size_t i, pl_ray *ray, double *stretch, pl_error *error)
 {
-    const double *o = j->origins + 3 * i, *d = j->directions + 3 * i;
+    double *d = ray->direction;
+    const double size = fmax(fabs(d[0]), fmax(fabs(d[1]), fabs(d[2])));
+    if (size == 0.0) return pl_fail(error, PL_ERROR_ARGUMENT, "rays", "the direction of ray %zu is zero", i);
+    *stretch = ldexp(1.0, (int)fmin(-ilogb(size), 1000.0));
+    for (int axis = 0; axis < 3; axis++) d[axis] *= *stretch;
+    ray->t_max /= *stretch;
+    return true;
+}
+
+static bool set_ray(const job *j, size_t i, pl_ray *ray, double *stretch, pl_error *error)
+{
+    const double *o = j->origins + 3 * i, *d = j->directions + 3 * i, square = pl_dot(d, d);
     for (int axis = 0; axis < 3; axis++) {
         ray->origin[axis] = o[axis];
         ray->direction[axis] = d[axis];
     }
     ray->t_max = j->distance ? j->distance[i] : INFINITY;
+    *stretch = 1.0;
     if (!pl_finite(o) || !pl_finite(d))
         return pl_fail(error, PL_ERROR_ARGUMENT, "rays", "ray %zu has a number that isn't finite", i);
-    if (d[0] == 0.0 && d[1] == 0.0 && d[2] == 0.0)
-        return pl_fail(error, PL_ERROR_ARGUMENT, "rays", "the direction of ray %zu is zero", i);
-    return true;
+    return (square > PL_LEAST_SQUARE && square < PL_MOST_SQUARE) || stretch_direction(i, ray, stretch, error);
 }
 
 /* What is told of a hit's surface. */
@@ -64,12 +76,12 @@ static bool tell_primitive(pl_tracer *tracer, const pl_hits *out, size_t i, pl_h
 }
 
 /* Writes what is asked of some hits; returns how many were done before an error. */
-static unsigned tell(pl_tracer *tracer, const pl_hits *out, size_t first, unsigned count, const pl_ray *rays, pl_hit *hits,
-                     pl_error *error)
+static unsigned tell(pl_tracer *tracer, const pl_hits *out, size_t first, unsigned count, const pl_ray *rays, const double *stretches,
+                     pl_hit *hits, pl_error *error)
 {
     const bool surface = out->symbol || out->rule || out->depth || out->normal;
-    for (unsigned i = 0; out->t && i < count; i++) out->t[first + i] = hits[i].t;
-    for (unsigned i = 0; out->bound && i < count; i++) out->bound[first + i] = hits[i].bound;
+    for (unsigned i = 0; out->t && i < count; i++) out->t[first + i] = hits[i].t * stretches[i];
+    for (unsigned i = 0; out->bound && i < count; i++) out->bound[first + i] = hits[i].bound * stretches[i];
     for (unsigned i = 0; (surface || out->primitive) && i < count; i++) {
         if (surface && !tell_surface(tracer, out, first + i, &rays[i], &hits[i], error)) return i;
         if (out->primitive && !tell_primitive(tracer, out, first + i, &hits[i], error)) return i;
@@ -81,8 +93,9 @@ static unsigned tell(pl_tracer *tracer, const pl_hits *out, size_t first, unsign
 static unsigned trace_some(job *j, pl_tracer *tracer, size_t first, unsigned count, pl_ray *rays, pl_hit *hits,
                            pl_error *error)
 {
+    double stretches[PL_TRACE_MANY];
     unsigned known = 0, done = 0;
-    while (known < count && set_ray(j, first + known, &rays[known], error)) known++;
+    while (known < count && set_ray(j, first + known, &rays[known], &stretches[known], error)) known++;
     if (!j->hits) {
         bool blocked[PL_TRACE_MANY];
         const unsigned traced = pl_trace_any_many(tracer, rays, known, blocked, error);
@@ -90,7 +103,7 @@ static unsigned trace_some(job *j, pl_tracer *tracer, size_t first, unsigned cou
         return done;
     }
     const unsigned traced = pl_trace_nearest_many(tracer, rays, known, hits, error);
-    return tell(tracer, j->hits, first, traced, rays, hits, error);
+    return tell(tracer, j->hits, first, traced, rays, stretches, hits, error);
 }
 
 static void report(job *j, size_t ray, const pl_error *error)

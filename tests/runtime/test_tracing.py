@@ -107,6 +107,21 @@ def test_t_counts_directions_and_the_normal_is_mapped_by_the_inverse_transpose()
     np.testing.assert_allclose(result.normal[1], [0, -1, 0], atol=1e-15)
 
 
+@pytest.mark.parametrize("length", [1e-300, 1e-170, 1e-160, 1e-12, 1e12, 1e160, 1e300])
+@pytest.mark.parametrize("accelerator", ACCELERATORS)
+def test_a_direction_of_any_length_meets_the_same(accelerator, length):
+    """Also where the squares of its numbers are too small, or too large, to be numbers."""
+    random = np.random.default_rng(7)
+    origins, directions = random.uniform(-3, 3, (400, 3)), random.normal(size=(400, 3))
+    with Scene(compile(ROOT / "scenes/tree.plsys", parameters={"order": 4}), accelerator=accelerator) as scene:
+        expected, found = scene.intersect(origins, directions), scene.intersect(origins, directions * length)
+        np.testing.assert_array_equal(found.primitive, expected.primitive)
+        np.testing.assert_allclose(found.t * length, expected.t, rtol=1e-9)
+        for factor, is_met in ((1 + 1e-6, True), (1 - 1e-6, False)):
+            hit = np.isfinite(expected.t)
+            assert (scene.occluded(origins[hit], directions[hit] * length, factor * found.t[hit]) == is_met).all()
+
+
 def test_a_miss_is_infinitely_far_and_nothing():
     result = hits(one_shape("sphere"), (0, 0, 5), (0, 0, 1))
     assert result.t[0] == np.inf and result.primitive[0] == result.symbol[0] == result.rule[0] == -1
