@@ -167,6 +167,30 @@ def test_nothing_is_cut_off_when_deeper_branches_outgrow_the_first(change):
     np.testing.assert_array_equal(hits.primitive[clear], which[clear])
 
 
+@pytest.mark.parametrize("detail", [0, 0.01])
+@pytest.mark.parametrize("items", [1, 7])
+def test_copies_too_thin_for_single_precision_block_the_same_rays(items, detail):
+    """Their frames' rays meet everything, and what lies behind them must not be taken for something before."""
+    text = """camera { location <1, -5, 2> look_at 0 }
+    Selection A { if (n <= 0) A -> sphere; else A -> [ --n; scale 1 1e-08 0.0001; trans 0.3 0.1 0.2; ] A
+        + [ --n; scale 0.1 1 1; trans -0.4 0.3 0.1 ] A + torus(0.3); }
+    Selection Root { Root -> [ n = 3 ] A; }
+    object { Root }
+    """
+    random, data = np.random.default_rng(3), compile(text)
+    with Scene(data, accelerator="none") as scene:
+        matrices = np.concatenate([batch.matrix for batch in scene.unfold()])
+        matrices = matrices[random.integers(0, len(matrices), 3000)]
+        origins = np.einsum("nij,nj->ni", matrices[:, :, :3], 0.7 * random.normal(size=(3000, 3))) + matrices[:, :, 3]
+        directions = np.einsum("nij,nj->ni", matrices[:, :, :3], random.normal(size=(3000, 3)))
+        distances = random.uniform(0, 1, 3000)
+        expected = scene.occluded(origins, directions, distances)
+    with Scene(data, accelerator="bvh", front_items=items, detail=detail) as scene:
+        np.testing.assert_array_equal(scene.occluded(origins, directions, distances), expected)
+        one_by_one = [scene.occluded(o, d, t)[0] for o, d, t in zip(origins, directions, distances)]
+        np.testing.assert_array_equal(one_by_one, expected)
+
+
 def test_adding_a_rule_elsewhere_leaves_a_random_plant_unchanged():
     text = Source.read("scenes/bush.plsys").data.decode()
     addition = "Selection Pebbles { Pebbles -> [ trans 5*rand(0) 3 0; scale 0.1 ] sphere; }\nobject { Pebbles }\n"

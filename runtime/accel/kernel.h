@@ -260,7 +260,7 @@ static inline int descend(pl_tracer *tracer, pl_bvh_lane *lane, uint32_t index, 
     f->front = &fronts->list[it->front & ~PL_NO_SHADOW];
     f->instance = instance;
     map_into(it, parent, f, &o, &d);
-    if (parent->blind) *local_max = local_t_max(f, query->t_max);
+    if (parent->blind) *local_max = t_between(f->t0, query->t_max, f->rate);
     tracer->counters.instances++;
     if (begin_frame(f, o, d, query->t_max, local_max)) return 1;
     return f->front->unbounded_count ? 2 : 0;
