@@ -42,7 +42,9 @@ static void count_users(const pl_front_plan *plan, uint32_t *users)
         const uint32_t index = plan->order[i];
         const pl_state *state = &states->list[index];
         if (!(plan->visits[index] > 0.0 || users[index])) continue;
-        for (uint32_t k = 0; k < state->item_count; k++) users[state->items[k].what] += state->items[k].kind == PL_NODE_ENTER;
+        for (uint32_t k = 0; k < state->item_count; k++) {
+            if (state->items[k].kind == PL_NODE_ENTER) users[state->items[k].what]++;
+        }
     }
 }
 

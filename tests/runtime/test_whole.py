@@ -17,6 +17,14 @@ SCENES = {"tree": {"order": 5}, "tree3d": {"order": 4}, "mirrors": {}, "shading"
           "terrain": {"level": 4}}  # fmt: skip
 
 
+# Fewer states than there are kinds of shapes.
+FEW_STATES = """camera { location <1, -5, 2> look_at 0 }
+Selection Rings { Rings -> torus(0.3) + [ scale 0.5 ] Discs; }
+Selection Discs { Discs -> disc + [ rotx 90 ] disc + [ trans 0 0 1 ] torus(0.1); }
+object { Rings }
+"""
+
+
 @pytest.mark.parametrize("variant", ["plain", "sanitized"])
 @pytest.mark.parametrize("source", ["shapes/test_shapes.c", "shapes/test_mesh.c"])
 def test_shapes(source, variant):
@@ -25,11 +33,13 @@ def test_shapes(source, variant):
 
 
 @pytest.mark.parametrize("variant", ["plain", "sanitized", "threads"])
-@pytest.mark.parametrize("scene", ["everything", "wooded hills", *SCENES])
+@pytest.mark.parametrize("scene", ["everything", "few states", "wooded hills", *SCENES])
 def test_every_way_of_tracing_gives_the_same_hits(scene, variant, tmp_path):
     path = tmp_path / "scene.plsb"
     if scene == "everything":
         path.write_bytes(one_of_everything().bytes())
+    elif scene == "few states":
+        path.write_bytes(compile(FEW_STATES))
     elif scene == "wooded hills":
         path.write_bytes(compile(WOODED, parameters={"level": 4}))
     else:
