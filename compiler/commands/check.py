@@ -35,7 +35,7 @@ def _check(path: str, arguments: argparse.Namespace) -> tuple[dict, bool]:
     prediction = None
     try:
         source = read_source(path)
-        diagnostics, compilation, prediction = check_scene(source, dict(arguments.parameters), arguments.seed)
+        diagnostics, compilation, prediction = check_scene(source, arguments.parameters, arguments.seed)
         prediction_json = compilation and _forecast_json(prediction, len(compilation.encode()))
     except PlsysError as error:
         if not arguments.json:

@@ -11,7 +11,7 @@ import codecs
 import os
 import re
 import sys
-from typing import Callable
+from typing import BinaryIO, Callable
 
 from ..reading.diagnostics import Diagnostic, PlsysError, SceneError, excerpt_at, render
 
@@ -27,11 +27,22 @@ def add_input_arguments(parser: argparse.ArgumentParser) -> None:
         dest="parameters",
         metavar="NAME=VALUE",
         type=parameter,
-        action="append",
-        default=[],
+        action=SetParameter,
+        default={},
         help="set a Parameter of the scene; may be given several times",
     )
     parser.add_argument("--seed", type=seed, help="set the random seed instead of global_settings' seed")
+
+
+class SetParameter(argparse.Action):
+    """Collects parameters by name. Each is set once: of two values one would be ignored."""
+
+    def __call__(self, parser, namespace, value, option_string=None) -> None:
+        name, number = value
+        before = getattr(namespace, self.dest)
+        if before.get(name, number) != number:
+            raise argparse.ArgumentError(self, f"'{name}' is set to {before[name]:g} and to {number:g}")
+        setattr(namespace, self.dest, before | {name: number})
 
 
 def seed(text: str) -> int:
@@ -67,17 +78,17 @@ def build_scene(arguments: argparse.Namespace):
     """The compilation of ``arguments.scene``; its warnings are printed. Raises SceneError, PlsysError."""
     from ..pipeline import build
 
-    compilation = build(read_source(arguments.scene), parameters=dict(arguments.parameters), seed=arguments.seed)
+    compilation = build(read_source(arguments.scene), parameters=arguments.parameters, seed=arguments.seed)
     show_diagnostics(d for d in compilation.diagnostics if d.severity == "warning")
     return compilation
 
 
-def read_source(path: str):
-    """The Source at ``path``; PlsysError where it can't be read, or isn't a scene's text."""
+def read_source(path: str, stream: BinaryIO | None = None):
+    """The Source at ``path``, or of what a stream holds; PlsysError where it can't be read, or isn't a scene's text."""
     from ..reading.source import Source
 
     try:
-        source = Source.read(path)
+        source = Source.read(path) if stream is None else Source(path, stream.read())
     except OSError as error:
         raise PlsysError(f"can't be read: {error.strerror}", path) from None
     if source.data.startswith(b"PLSB"):

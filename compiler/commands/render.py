@@ -255,7 +255,7 @@ def _write(arguments: argparse.Namespace, image: dict, statistics: dict) -> None
     metadata = {
         "Software": "plsys",
         "plsys:scene": arguments.scene,
-        "plsys:parameters": " ".join(f"{name}={value:g}" for name, value in arguments.parameters),
+        "plsys:parameters": " ".join(f"{name}={value:g}" for name, value in arguments.parameters.items()),
         "plsys:accelerator": statistics["accelerator"],
         "plsys:primitives": str(statistics["primitives"]),
         "ImageDescription": f"{arguments.scene}, rendered by plsys",

@@ -127,6 +127,7 @@ def test_more_memory_than_there_is_may_be_allowed(tmp_path):
         (["render", "a", "-o", "b.png", "--memry=4M"], "no option '--memry': did you mean '--memory'?"),
         (["render", "a", "b", "-o", "b.png"], "'b' is one argument too many"),
         (["lsp", "--tcp", "65536"], "'65536' isn't a port, 0 to 65535"),
+        (["render", "a", "-o", "b.png", "-D", "n=1", "-D", "n=2"], "'n' is set to 1 and to 2"),
         (["render", "a", "-o", "b.png", "--seed", "x"], "'x' isn't a whole number"),
     ],
 )

@@ -1,8 +1,12 @@
-"""`plsys format`: files in place, --check, broken files, JSON."""
+"""`plsys format`: files in place, standard input, --check, broken files, JSON."""
 
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+
+import pytest
 
 from plsys.compiler.cli import main
 
@@ -48,3 +52,24 @@ def test_json(tmp_path, capsys):
 def test_an_unreadable_file(tmp_path, capsys):
     assert main(["format", str(tmp_path / "none.plsys")]) == 2
     assert "can't be read" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "text, options, code, out, err",
+    [
+        (ROUGH, (), 0, NEAT, ""),
+        (NEAT, (), 0, NEAT, ""),
+        (ROUGH, ("--check",), 1, "<stdin>: would change\n", ""),
+        (NEAT, ("--check",), 0, "", ""),
+        (ROUGH + "Calculation D{n=;}\n", (), 2, NEAT + "Calculation D{n=;}\n", "<stdin>:2:16: error[missing]"),
+        (ROUGH, ("other.plsys",), 2, "", "-: error: standard input goes to standard output, which has no room for other files"),
+        (ROUGH, ("--json",), 2, "", "-: error: standard input goes to standard output, which has no room for --json"),
+    ],
+)
+def test_standard_input_goes_to_standard_output(text, options, code, out, err):
+    """As editors want a formatter."""
+    command = [sys.executable, "-m", "plsys.compiler.cli", "format", "-", *options]
+    done = subprocess.run(command, input=text.encode(), capture_output=True, timeout=60)
+    assert done.returncode == code, done.stderr
+    assert done.stdout.decode() == out or "--json" in options
+    assert done.stderr.decode().startswith(err) and bool(err) == bool(done.stderr)
