@@ -22,9 +22,9 @@ test: .venv/.tests ## run all tests
 	sh tests/editors/install.sh $(BIN)/python
 	$(BIN)/python -m pytest tests
 
-stress: .venv/.tests ## the tests that try at random, for hours: 10^6 edits, 10^5 messages
+stress: .venv/.tests ## the tests that try at random, for hours: 10^6 edits, 10^5 messages, 10^4 extreme scenes
 	PLSYS_STRESS=1 $(BIN)/python -m pytest tests/grammar/test_incremental.py tests/compiler/test_mutated.py \
-	  tests/lsp/test_editing.py tests/lsp/test_hostile.py
+	  tests/lsp/test_editing.py tests/lsp/test_hostile.py tests/test_extremes.py
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1 \t\2/p' Makefile | expand -t 24
