@@ -218,7 +218,7 @@ static bool build_states(pl_scene *scene, size_t limit, pl_error *error)
  * unfolded on touch. Where there isn't enough for that either, what fronts need is told. */
 static bool build_structure(pl_scene *scene, pl_error *error)
 {
-    pl_error why = {.code = PL_OK}, ignored;
+    pl_error why = {.code = PL_OK};
     if (!scene->accel->build || scene->accel->build(scene, &why)) return true;
     if (scene->accel != &pl_accel_bvh || why.code != PL_ERROR_LIMIT || strcmp(why.place, "memory") != 0) {
         *error = why;
@@ -227,7 +227,7 @@ static bool build_structure(pl_scene *scene, pl_error *error)
     scene->accel->destroy(scene);
     pl_states_free(&scene->states);
     scene->accel = &pl_accel_lazy;
-    if (scene->accel->build(scene, &ignored)) return true;
+    if (scene->accel->build(scene, NULL)) return true;
     *error = why;
     return false;
 }

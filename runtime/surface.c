@@ -408,9 +408,8 @@ bool pl_trace_surface(pl_tracer *tracer, const pl_ray *ray, const pl_hit *hit, p
     if (!accel->items) return walk_surface(tracer, ray, hit, &hit->path, false, surface, error);
     if (!accel->items(tracer->scene, &hit->trail, &tracer->items)) return pl_fail_memory(error, "shading a hit");
     if (!tracer->items.count) {
-        pl_error ignored;
         if (!accel->path(tracer->scene, &hit->trail, &tracer->scratch)) return pl_fail_memory(error, "shading a hit");
-        return (accel->skip && walk_surface(tracer, ray, hit, &tracer->scratch, true, surface, &ignored)) ||
+        return (accel->skip && walk_surface(tracer, ray, hit, &tracer->scratch, true, surface, NULL)) ||
                walk_surface(tracer, ray, hit, &tracer->scratch, false, surface, error);
     }
     const int64_t textured = innermost_texture(&tracer->items, &code);

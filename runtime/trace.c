@@ -133,10 +133,9 @@ static bool trace_many(pl_tracer *tracer, const pl_ray *rays, unsigned count, pl
                        pl_query *queries)
 {
     const pl_accel *accel = tracer->scene->accel;
-    pl_error error;
     if (!accel->trace_many || count < 2) return false;
     for (unsigned i = 0; i < count; i++) {
-        begin_query(&queries[i], tracer, &rays[i], kind, &error);
+        begin_query(&queries[i], tracer, &rays[i], kind, NULL);
         if (!hits) continue;
         queries[i].hit = &hits[i];
         begin_hit(&hits[i]);

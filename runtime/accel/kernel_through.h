@@ -21,8 +21,8 @@ static inline __attribute__((always_inline)) packet_way way_of(const pl_bvh_work
 /* Into a front, and back when all of it is done. */
 static inline __attribute__((always_inline)) void push_front(packet_way *way, const pl_front *front)
 {
+    way->own[way->top] = way->own[way->top + 1] = UINT32_MAX;
     way->stack[way->top++] = entry_of(0.0f, pl_ref_of(PL_KIND_RETURN, 0));
-    way->own[way->top] = UINT32_MAX;
     way->stack[way->top++] = entry_of(0.0f, front->root);
 }
 

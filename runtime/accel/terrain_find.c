@@ -436,11 +436,10 @@ static void number(pl_scene *scene, pl_terrains *terrains)
 static bool build_states(pl_scene *scene, pl_terrains *terrains, uint32_t most)
 {
     uint64_t omitted = 0;
-    pl_error ignored;
     for (uint32_t i = 0; i < terrains->single_count; i++) free_place(&terrains->singles[i].place);
     terrains->single_count = 0;
     for (uint32_t i = 0; i < terrains->count; i++) omitted |= UINT64_C(1) << terrains->list[i].entered;
-    if (!pl_states_build_without(&scene->states, omitted, scene->program, scene->meshes, false, scene->memory, most, &ignored))
+    if (!pl_states_build_without(&scene->states, omitted, scene->program, scene->meshes, false, scene->memory, most, NULL))
         return false;
     number(scene, terrains);
     return !scene->states.list[0].endless;
