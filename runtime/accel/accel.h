@@ -13,11 +13,13 @@
 #include "../class.h"
 #include "../scene.h"
 
-/* Steps that one ray may take: entries of bvh's stack; nodes of a walk. Far beyond any ray that makes sense, it ends
- * those of scenes in which 2^n equal instances lie in the same place. Tests may lower both. */
+/* Steps that one ray may take: entries of bvh's stack; nodes of a walk; nodes visited to unfold states and to bound classes, of
+ * which a ray that grazes all trees of a forest needs less than a hundredth. Far beyond any ray that makes sense, they end those of
+ * scenes in which 2^n equal instances lie in the same place. Tests may lower them. */
 #ifndef PL_LIMIT_RAY_STEPS
 #define PL_LIMIT_RAY_STEPS (UINT64_C(1) << 24)
 #define PL_LIMIT_WALK_STEPS (UINT64_C(1) << 30)
+#define PL_LIMIT_UNFOLD_STEPS (UINT64_C(1) << 24)
 #endif
 
 typedef enum pl_query_kind { PL_QUERY_NEAREST, PL_QUERY_ANY, PL_QUERY_ALL } pl_query_kind;

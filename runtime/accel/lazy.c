@@ -12,10 +12,7 @@
 
 #include <string.h>
 
-/* What one ray may do before it is given up: nodes visited to unfold states and to bound classes, and instances entered
- * of which nothing is known. The first is hundreds of times what a ray needs that grazes all trees of a forest; a path has
- * no more symbols than the second. */
-#define MOST_WORK (UINT64_C(1) << 24)
+/* Instances of which nothing is known that one ray may enter: a path has no more symbols. */
 enum { MOST_UNKNOWN = PL_LIMIT_DEPTH + 1024 };
 
 /* Rays that go together have this part of each limit. Beyond it each goes alone, since one of them may have the error; that
@@ -227,8 +224,8 @@ static bool enter(pl_tracer *tracer, const pl_lazy_item *it, pl_error *error)
         if (!state) return false;
         if (it && w->changes == changes) atomic_store_explicit(place, state, memory_order_release);
     }
-    if (w->spent > MOST_WORK / w->part)
-        return fail_work(tracer->scene, f->symbol, "needed to visit more nodes of the graph than", MOST_WORK, error);
+    if (w->spent > PL_LIMIT_UNFOLD_STEPS / w->part)
+        return fail_work(tracer->scene, f->symbol, "needed to visit more nodes of the graph than", PL_LIMIT_UNFOLD_STEPS, error);
     return push_items(w, index, tracer->scene->gates != NULL, &tracer->counters, error);
 }
 

@@ -19,7 +19,8 @@ RUNTIME = HERE.parents[1] / "runtime"
 FLAGS = ["-std=gnu11", "-g", "-Wall", "-Wextra", "-Werror", "-Wno-psabi", "-ffp-contract=off", "-fno-math-errno"]
 FLAGS += [f"-I{RUNTIME}", f"-I{RUNTIME / 'include'}", f"-I{HERE}"]
 # Under sanitizers steps are slow, so rays that would never end come to their limit sooner.
-FEW_STEPS = ["-DPL_LIMIT_RAY_STEPS=(UINT64_C(1)<<13)", "-DPL_LIMIT_WALK_STEPS=(UINT64_C(1)<<24)"]
+FEW_STEPS = ["-DPL_LIMIT_RAY_STEPS=(UINT64_C(1)<<13)", "-DPL_LIMIT_WALK_STEPS=(UINT64_C(1)<<24)",
+             "-DPL_LIMIT_UNFOLD_STEPS=(UINT64_C(1)<<18)"]
 VARIANTS = {
     "plain": ["-O2"],
     "sanitized": ["-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", *FEW_STEPS],
