@@ -125,19 +125,12 @@ static void begin_normals(leaf_surface *leaf, const pl_hit *hit, pl_surface *sur
     if (leaf->smooth) pl_mesh_flat_normal(leaf->mesh, hit->part, surface->flat);
 }
 
-/* Makes n a unit normal. One that was nothing but rounding, as of a shape seen from 1e16 times its size, is turned against the ray. */
+/* A normal that was nothing but rounding, as of a shape seen from 1e16 times its size, is turned against the ray. */
 static void set_unit(double n[3], const double direction[3])
 {
-    const double x = fabs(n[0]), y = fabs(n[1]), z = fabs(n[2]), wide = x > y ? x : y; /* fmax is a call */
-    const double size = wide > z ? wide : z;
-    if (__builtin_expect(!(size > 0.0 && size < INFINITY), 0)) {
-        for (int axis = 0; axis < 3; axis++) n[axis] = -direction[axis];
-        pl_normalize(n);
-        return;
-    }
-    for (int axis = 0; axis < 3; axis++) n[axis] /= size;
-    const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    for (int axis = 0; axis < 3; axis++) n[axis] /= length;
+    if (pl_normalize(n) > 0.0) return;
+    for (int axis = 0; axis < 3; axis++) n[axis] = -direction[axis];
+    pl_normalize(n);
 }
 
 static void finish_surface(const pl_scene *scene, const leaf_surface *leaf, const pl_ray *ray, const pl_hit *hit,
