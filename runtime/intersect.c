@@ -24,8 +24,8 @@ typedef struct job {
     size_t failed;
 } job;
 
-/* A direction whose squares leave the range of doubles is traced longer by a power of two: t of the one given are *stretch times the
- * ray's. */
+/* A direction whose squares leave the range of doubles is traced longer or shorter by a power of two: t of the one given are *stretch
+ * times the ray's. */
 static bool stretch_direction(size_t i, pl_ray *ray, double *stretch, pl_error *error)
 {
     double *d = ray->direction;

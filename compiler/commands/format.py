@@ -47,8 +47,10 @@ def _format(path: str, arguments: argparse.Namespace) -> dict:
         source = read_source(path) if is_file else read_source("<stdin>", sys.stdin.buffer)
         formatted = format_document(Document(source.path, source.data))
         changed = bool(formatted.edits)
-        if not arguments.check:
-            _write(path if is_file else None, formatted.data, changed)
+        if not is_file and not arguments.check:
+            sys.stdout.buffer.write(formatted.data)
+        elif changed and not arguments.check:
+            _write(path, formatted.data)
     except PlsysError as error:
         print(f"{error.place}: error: {error.reason}", file=sys.stderr)
         return {"path": path, "changed": False, "errors": 1, "error": error.reason}
@@ -71,12 +73,9 @@ def _show_errors(source: Source, arguments: argparse.Namespace) -> int:
     return len(found)
 
 
-def _write(path: str | None, data: bytes, changed: bool) -> None:
-    """Replace the file's text at once, and keep its permissions. None: write it to standard output, changed or not."""
-    if path is None:
-        sys.stdout.buffer.write(data)
-    elif changed:
-        mode = Path(path).stat().st_mode
-        with written_whole(path) as temporary:
-            temporary.write_bytes(data)
-            temporary.chmod(mode)
+def _write(path: str, data: bytes) -> None:
+    """Replace the file's text at once, and keep its permissions."""
+    mode = Path(path).stat().st_mode
+    with written_whole(path) as temporary:
+        temporary.write_bytes(data)
+        temporary.chmod(mode)

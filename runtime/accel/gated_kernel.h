@@ -112,6 +112,7 @@ static inline int gated_descend(pl_tracer *tracer, uint32_t index, uint32_t inst
     double4 o, d;
     bool open;
     map_into(it, parent, f, &o, &d);
+    /* Not local_t_max: whether f is blind isn't known yet. */
     if (parent->blind) *local_max = t_between(f->t0, query->t_max, f->rate);
     tracer->counters.instances++;
     const bool met = begin_frame(f, o, d, query->t_max, local_max);

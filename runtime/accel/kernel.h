@@ -260,6 +260,7 @@ static inline int descend(pl_tracer *tracer, pl_bvh_lane *lane, uint32_t index, 
     f->front = &fronts->list[it->front & ~PL_NO_SHADOW];
     f->instance = instance;
     map_into(it, parent, f, &o, &d);
+    /* Not local_t_max: whether f is blind isn't known yet. */
     if (parent->blind) *local_max = t_between(f->t0, query->t_max, f->rate);
     tracer->counters.instances++;
     if (begin_frame(f, o, d, query->t_max, local_max)) return 1;

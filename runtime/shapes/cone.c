@@ -4,6 +4,7 @@
  * a ray meets it in one interval: that of the nappe with w >= 0, cut by the slab 0 <= z <= 1. */
 #include <stddef.h>
 
+#include "../vector.h"
 #include "shape.h"
 
 enum { SIDE, BOTTOM, TOP };
@@ -58,7 +59,7 @@ static bool narrow_to_side(double k, const double o[3], const double d[3], pl_ro
  * meets it. So the ray begins at its point nearest to the origin. */
 static bool narrow_from_afar(double k, const double o[3], const double d[3], pl_root *enter, pl_root *leave)
 {
-    const double s = -(o[0] * d[0] + o[1] * d[1] + o[2] * d[2]) / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    const double s = -pl_dot(o, d) / pl_dot(d, d);
     const double near[3] = {o[0] + s * d[0], o[1] + s * d[1], o[2] + s * d[2]};
     pl_root first = {-INFINITY, SIDE}, second = {INFINITY, SIDE};
     return narrow_to_side(k, near, d, &first, &second) && narrow(first.t + s, second.t + s, enter, leave);
@@ -70,8 +71,7 @@ static int roots(const double *arguments, const double o[3], const double d[3], 
     const double far = 0x1p10, k = arguments[0] - 1.0;
     pl_root enter = {-INFINITY, SIDE}, leave = {INFINITY, SIDE};
     if (!pl_interval_slab(o[2], d[2], 0.0, 1.0, BOTTOM, TOP, &enter, &leave)) return 0;
-    const bool is_near = o[0] * o[0] + o[1] * o[1] + o[2] * o[2] < far * far;
-    if (!(is_near ? narrow_to_side : narrow_from_afar)(k, o, d, &enter, &leave)) return 0;
+    if (!(pl_dot(o, o) < far * far ? narrow_to_side : narrow_from_afar)(k, o, d, &enter, &leave)) return 0;
     return pl_interval_roots(enter, leave, t_min, t_max, out);
 }
 

@@ -103,7 +103,7 @@ static bool parse_detail(const char *text, double *detail)
     return true;
 }
 
-/* Bytes, with K, M and G for powers of 1024. */
+/* Bytes, with K, M, G and T for powers of 1024. */
 static bool parse_size(const char *text, size_t *size)
 {
     static const char units[] = "KMGT";
