@@ -93,14 +93,14 @@ class _Layout:
         self._enter(0)
         pairs = zip(range(1, len(roles)), roles, roles[1:], self.starts[1:], widths[1:])
         matter = [
-            (i, role, before.fixed.get(role) != width)
+            (i, role, start, is_wrong)
             for i, before, role, start, width in pairs
-            if before.fixed.get(role) != width or role.is_bracket or start in marks
+            if (is_wrong := before.fixed.get(role) != width) or role.is_bracket or start in marks
         ]
-        for i, role, is_wrong in matter:
+        for i, role, start, is_wrong in matter:
             if is_wrong or ((role.closes or len(self.open) == 1) and self._must_break(i)):
                 self._between(i)
-            if role.is_bracket or self.starts[i] in marks:
+            if role.is_bracket or start in marks:
                 self._enter(i)
         self._tail(is_last)
         return self.edits
@@ -111,7 +111,7 @@ class _Layout:
         text = self.text
         gaps = zip(self.ends, self.starts[1:])
         widths = [
-            start - end if start == end or (start == end + 1 and text[end] == 0x20) else self._width(end, start)
+            0 if start == end else 1 if start == end + 1 and text[end] == 0x20 else self._width(end, start)
             for end, start in gaps
         ]
         return [0, *widths, 1]

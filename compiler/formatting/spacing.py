@@ -5,6 +5,7 @@ Example: between ``n`` and ``=`` one, or as many as the author aligned the ``=``
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 from .tokens import Role
@@ -47,6 +48,7 @@ class Spaces(NamedTuple):
     may_align: bool = False  # whether more spaces stay, where columns are aligned
 
 
+@lru_cache(4096)  # few kinds of gaps are most of a file's
 def spaces(gap: Gap) -> Spaces:
     before, after = gap.before, gap.after
     kind = after.kind

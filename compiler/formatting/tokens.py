@@ -45,10 +45,8 @@ class Role:
         self.children: dict[int, Role] = {}  # by the number of a child's type: reading it as text takes longer
 
     def of_child(self, node: Node) -> Role:
-        """The role of a child of such a node."""
-        found = self.children.get(node.kind_id)
-        if found is None:
-            found = self.children[node.kind_id] = _role(node.type, self.kind, not node.is_named)
+        """The role of a child of such a node, from now on in ``children``."""
+        found = self.children[node.kind_id] = _role(node.type, self.kind, not node.is_named)
         return found
 
 
@@ -77,27 +75,25 @@ def tokens_of(root: Node, text: bytes) -> Tokens:
 
 
 def _walk(node: Node, own: Role, text: bytes, found: Tokens) -> None:
-    children, role_of = node.children, own.of_child
-    if own.is_container:
-        for child in children:
-            role = role_of(child)
-            if not role.is_leaf and not role.is_comment:
-                found.units[child.start_byte] = 0
-        if own.kind == "selection_body":
-            _Guards([child for child in children if child.type in _PIECES], text, found.units).read()
-    elif own.aligns:
+    children, known, is_container, items = node.children, own.children, own.is_container, found.items
+    if own.aligns:
         _align(children, found)
-    items = found.items
     for child in children:
-        role = role_of(child)
-        if not role.is_leaf and child.child_count:
-            _walk(child, role, text, found)
-            continue
-        start, end = child.start_byte, child.end_byte
+        role = known.get(child.kind_id) or own.of_child(child)
+        start = child.start_byte
+        if not role.is_leaf:
+            if is_container and not role.is_comment:
+                found.units[start] = 0
+            if child.child_count:
+                _walk(child, role, text, found)
+                continue
+        end = child.end_byte
         if role.is_special:
             role, end = _special(role, start, end, node, text)
         if end > start:
             items.append((role, start, end))
+    if own.kind == "selection_body":
+        _Guards([child for child in children if child.type in _PIECES], text, found.units).read()
 
 
 def _align(children: list[Node], found: Tokens) -> None:
