@@ -19,6 +19,8 @@ import threading
 from collections import deque
 from typing import Any, BinaryIO, Callable
 
+from plsys.compiler.analysis import give_turns
+
 from .session import Session
 
 logger = logging.getLogger(__name__)
@@ -32,12 +34,11 @@ _ENCODER = json.JSONEncoder(separators=(",", ":"), check_circular=False)  # no m
 GARBAGE_THRESHOLDS = 200_000, 10, 1_000
 MANY_OBJECTS = 50_000
 
-# The thread that reads gets its turn after so long, and reads what has come in one go: each turn that it waits for is a delay.
-SWITCH_S = 0.0002
+# The thread that reads takes what has come in one go: each turn that it waits for is a delay.
 INPUT_BUFFER_BYTES = 1 << 18
 
 # Whole-file checks begin when nothing came for so long: messages that belong together come within some milliseconds.
-CHECKS_S = 0.01
+CHECKS_S = 0.005
 # What makes nobody wait but the next key (garbage, formats) is done in longer pauses.
 PAUSE_S = 0.1
 # When a pause is looked for again where something was to do just then.
@@ -184,7 +185,7 @@ def serve_stdio() -> int:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     # A stream of its own: Python closes sys.stdin at exit, and aborts when a thread still reads it.
     stream = os.fdopen(os.dup(sys.stdin.fileno()), "rb", INPUT_BUFFER_BYTES)
-    sys.setswitchinterval(SWITCH_S)
+    give_turns()
     return asyncio.run(_serve(stream, output))
 
 

@@ -39,10 +39,11 @@ from .scene import Scene
 from .text import Block, Change, Text
 from .whole import Checker, Result
 from .whole import run as check_whole
+from .worker import give_turns
 
 __all__ = [
     "Action", "Block", "CODES", "Change", "Checker", "Context", "Deadline", "Definition", "Diagnostic", "Document", "Facts", "Folders",
     "Formatted", "Found", "GuardInsight", "Insight", "Meaning", "Message", "Motion", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
     "SCENE_SUFFIX", "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "enters_keys", "facts_of", "fix_all", "fixes",
-    "format_document", "ignoring", "insights_in", "insights_of", "line_break", "motion_of", "nearest", "prepare_format", "prepare_messages", "queries", "refactorings", "stretching_of", "syntax", "vocabulary",
+    "format_document", "give_turns", "ignoring", "insights_in", "insights_of", "line_break", "motion_of", "nearest", "prepare_format", "prepare_messages", "queries", "refactorings", "stretching_of", "syntax", "vocabulary",
 ]  # fmt: skip
