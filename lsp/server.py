@@ -39,7 +39,7 @@ INPUT_BUFFER_BYTES = 1 << 18
 
 # Whole-file checks begin when nothing came for so long: messages that belong together come within some milliseconds.
 CHECKS_S = 0.005
-# What makes nobody wait but the next key (garbage, formats) is done in longer pauses.
+# Garbage, which makes nobody wait but the next key, is looked for in longer pauses.
 PAUSE_S = 0.1
 # When a pause is looked for again where something was to do just then.
 BUSY_S = 0.005
@@ -57,7 +57,7 @@ class Dispatcher:
         self.inbox: deque[Any] = deque()
         self.arrived = self._delivered = 0  # messages that a thread has read, and those of them that deliver() has seen
         self.cancelled: set[Any] = set()
-        self._scheduled = self._has_opened = self._has_closed = self._has_heard = False
+        self._scheduled = self._prepares = self._has_opened = self._has_closed = self._has_heard = False
         self._pause: asyncio.TimerHandle | None = None
 
     def deliver(self, body: bytes) -> None:
@@ -116,6 +116,9 @@ class Dispatcher:
             self.leave()
         elif self.is_busy:
             self._schedule()
+        elif not self._prepares:
+            self._prepares = True
+            asyncio.get_running_loop().call_soon(self._prepare)
 
     def _await_pause(self) -> None:
         """Have ``_check`` called when the client has said nothing for a while. Work that workers left is no reason to wait."""
@@ -135,7 +138,7 @@ class Dispatcher:
         self._pause = asyncio.get_running_loop().call_later(PAUSE_S - CHECKS_S, self._rest)
 
     def _rest(self) -> None:
-        """The client has paused: do what need not be done between two keys."""
+        """The client has paused: look for garbage."""
         if self.is_busy:
             self._pause = asyncio.get_running_loop().call_later(BUSY_S, self._rest)
             return
@@ -145,18 +148,12 @@ class Dispatcher:
             gc.unfreeze()
             gc.collect()
         gc.freeze()
-        self._prepare()
 
     def _prepare(self) -> None:
-        """Go on with what can be prepared as long as nothing else is to do."""
-        if self.is_busy:
-            delay = PAUSE_S
-        elif self.session.prepare():
-            self._pause = None
-            return
-        else:
-            delay = 0.0
-        self._pause = asyncio.get_running_loop().call_later(delay, self._prepare)
+        """Go on with what can be prepared as long as nothing else is to do; after that, the next turn begins again."""
+        self._prepares = not self.is_busy and not self.session.prepare()
+        if self._prepares:
+            asyncio.get_running_loop().call_soon(self._prepare)
 
     def _handle(self, message: Any) -> None:
         number = message.get("id") if isinstance(message, dict) else None

@@ -15,9 +15,10 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from typing import Any, Callable
+from itertools import chain
+from typing import Any, Callable, Iterator
 
-from plsys.compiler.analysis import Checker, Deadline, Document, Found, Result, prepare_format
+from plsys.compiler.analysis import Checker, Deadline, Document, Found, Result, preparing_format
 
 from .progress import Progress
 from .workspace import Workspace
@@ -44,6 +45,7 @@ class Updates:
         self._published: dict[str, tuple[int | None, list[dict]]] = {}
         self._published_at: dict[Document, float] = {}  # of those with work left
         self._has_opened = False  # a file was opened that the checks don't know yet
+        self._preparing: Iterator[None] = iter(())  # the steps that are left of what is prepared
 
     def notify(self, method: str, params: Any) -> None:
         raise NotImplementedError
@@ -78,6 +80,7 @@ class Updates:
     def _touch(self, document: Document) -> None:
         """Remember that ``document`` and those that share a scene with it need new diagnostics."""
         self._changed[document] = None
+        self._preparing = chain.from_iterable(preparing_format(each) for each in list(self.workspace.uris))
         for scene in document.scenes:
             if self._checker is not None:
                 self._checker.want(scene)
@@ -138,9 +141,10 @@ class Updates:
                 self.progress.end("checks")
 
     def prepare(self) -> bool:
-        """Do for a moment, in a pause, what a request would have to wait for; whether nothing is left of that."""
+        """Do for a moment what a request would have to wait for; whether nothing is left of that. To be called when nothing else
+        is to do."""
         deadline = Deadline(SLICE, lambda: self._is_message_waiting() or bool(self._arrived))
-        return self.has_work or all(prepare_format(document, deadline) for document in list(self.workspace.uris))
+        return not any(deadline.has_passed() for _ in self._preparing)
 
     def _later(self, take: Callable[[Any], None], what: Any) -> None:
         """Have ``update`` take in what a worker found. In any thread."""

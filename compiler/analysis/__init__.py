@@ -30,7 +30,7 @@ from .keys import enters_keys
 from .fixes import fix_all, fixes, ignoring
 from .folders import SUFFIX as SCENE_SUFFIX
 from .folders import Folders, Found
-from .format import Formatted, format_document, prepare_format
+from .format import Formatted, format_document, preparing_format
 from .insights import GuardInsight, Insight, SymbolInsight, ValueInsight, insights_in, insights_of
 from .motion import Motion, constant_of, motion_of, stretching_of
 from .project import Project
@@ -45,5 +45,5 @@ __all__ = [
     "Action", "Block", "CODES", "Change", "Checker", "Context", "Deadline", "Definition", "Diagnostic", "Document", "Facts", "Folders",
     "Formatted", "Found", "GuardInsight", "Insight", "Meaning", "Message", "Motion", "Name", "Outline", "Place", "PlsysError", "Project", "Result",
     "SCENE_SUFFIX", "Scene", "Span", "SymbolInsight", "Text", "TextEdit", "ValueInsight", "check_whole", "constant_of", "context_at", "enters_keys", "facts_of", "fix_all", "fixes",
-    "format_document", "give_turns", "ignoring", "insights_in", "insights_of", "line_break", "motion_of", "nearest", "prepare_format", "prepare_messages", "queries", "refactorings", "stretching_of", "syntax", "vocabulary",
+    "format_document", "give_turns", "ignoring", "insights_in", "insights_of", "line_break", "motion_of", "nearest", "prepare_messages", "preparing_format", "queries", "refactorings", "stretching_of", "syntax", "vocabulary",
 ]  # fmt: skip

@@ -14,12 +14,15 @@ Example::
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Iterator
 
 from ..formatting import Edit, apply, format_tree
-from .deadline import Deadline
 from .document import Document
 from .facts import facts_of
 from .text import Block
+
+# So many blocks whose format is known are left behind in a step: as long as finding that of one takes.
+KNOWN_BLOCKS = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,16 +61,15 @@ def format_document(document: Document, start: int = 0, end: int | None = None) 
     return Formatted(document, edits, skipped)
 
 
-def prepare_format(document: Document, deadline: Deadline) -> bool:
-    """Find out up to ``deadline`` what formats the blocks of ``document``, so that formatting it has little left to do;
-    whether all is found out."""
-    line_end, last = line_end_of(document), len(document.text.blocks) - 1
-    for index, block in enumerate(document.text.blocks):
+def preparing_format(document: Document) -> Iterator[None]:
+    """Finds out step by step what formats the blocks of ``document``, so that formatting it has little left to do."""
+    line_end, blocks = line_end_of(document), list(document.text.blocks)
+    for index, block in enumerate(blocks):
         if "formatted" not in block.__dict__ and not facts_of(block).is_broken:
-            _edits_of(block, line_end, index == 0, index == last)
-            if deadline.has_passed():
-                return False
-    return True
+            _edits_of(block, line_end, index == 0, index + 1 == len(blocks))
+            yield
+        elif index % KNOWN_BLOCKS == 0:
+            yield
 
 
 def line_end_of(document: Document) -> bytes:
