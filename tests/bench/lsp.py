@@ -200,23 +200,39 @@ def typing(bench: Bench, count: int, texts: list[str], what: str) -> None:
         bench.edit(what, [deletion(place, len(text))])
 
 
+Places = Callable[[Bench], list[dict]]
+
+
+def anywhere(bench: Bench) -> list[dict]:
+    """100 places, the last one first."""
+    places = sorted({(p["line"], p["character"]) for p in (bench.place() for _ in range(100))}, reverse=True)
+    return [{"line": line, "character": character} for line, character in places]
+
+
+def at_occurrences(bench: Bench) -> list[dict]:
+    """Behind a number, where it stands 100 times: what people put many cursors at. The last one first."""
+    found = [(i, text.index("scale 0.8") + 9) for i, text in enumerate(bench.lines) if "scale 0.8" in text]
+    start = bench.random.randrange(0, max(1, len(found) - 100))
+    return [{"line": line, "character": character} for line, character in reversed(found[start : start + 100])]
+
+
+def keys(places: list[dict]) -> tuple[list[dict], list[dict]]:
+    """The changes of one key at all places, and of taking it back."""
+    return [insertion(place, "x") for place in places], [deletion(place, 1) for place in reversed(places)]
+
+
 def cursors(bench: Bench, count: int) -> None:
     """One key at 100 places at once."""
     for _ in range(count // 2):
-        places = sorted({(p["line"], p["character"]) for p in (bench.place() for _ in range(100))}, reverse=True)
-        changes = [{"line": line, "character": character} for line, character in places]
-        bench.edit("edit → diagnostics, 100 cursors", [insertion(place, "x") for place in changes])
-        bench.edit("edit → diagnostics, 100 cursors", [deletion(place, 1) for place in reversed(changes)])
+        for edits in keys(anywhere(bench)):
+            bench.edit("edit → diagnostics, 100 cursors", edits)
 
 
-def all_of_cursors(bench: Bench, count: int) -> None:
+def all_of_cursors(bench: Bench, count: int, places: Places, what: str) -> None:
     """As ``cursors``, up to where all is known. What is left of edits before isn't counted."""
-    what = "100 cursors → all diagnostics (pull)"
     bench.client.request("textDocument/diagnostic", {"textDocument": {"uri": bench.uri}})
     for _ in range(count // 2):
-        places = sorted({(p["line"], p["character"]) for p in (bench.place() for _ in range(100))}, reverse=True)
-        changes = [{"line": line, "character": character} for line, character in places]
-        for edits in ([insertion(place, "x") for place in changes], [deletion(place, 1) for place in reversed(changes)]):
+        for edits in keys(places(bench)):
             bench.version += 1
             started = bench.start()
             bench.client.change(bench.uri, bench.version, *edits)
@@ -330,7 +346,8 @@ def measured(bench: Bench, edits: int) -> Bench:
     typing(bench, edits, ["{", "}", "(", "[", '"', "/*"], "edit → diagnostics, broken braces")
     if len(bench.lines) > 500:
         cursors(bench, max(2, edits // 10))
-        all_of_cursors(bench, max(2, edits // 10))
+        all_of_cursors(bench, max(2, edits // 10), anywhere, "100 cursors → all diagnostics (pull)")
+        all_of_cursors(bench, max(2, edits // 10), at_occurrences, "100 cursors at a number → all diagnostics")
     burst(bench, max(1, edits // 50))
     requests(bench, edits)
     checks(bench, max(10, edits // 3))
