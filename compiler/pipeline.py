@@ -114,11 +114,19 @@ def read(scene: str | Path | Source) -> Source:
 
 def build_graph(model: Model, is_verified: bool = True) -> Graph:
     """The graph of a model without errors, after all passes. Unless ``is_verified``, it isn't looked for mistakes of ours:
-    where nothing is drawn from it and time counts."""
+    where nothing is drawn from it and time counts. Where there is one, the passes run once more, to tell which makes it."""
     from .graph.lower import lower
     from .graph.passes import run_passes
+    from .graph.verify import InvalidGraph, verify
 
-    return run_passes(lower(model), is_verified)
+    graph = run_passes(lower(model), is_verified=False)
+    if is_verified:
+        try:
+            verify(graph, "all passes")
+        except InvalidGraph:
+            run_passes(lower(model))
+            raise
+    return graph
 
 
 @contextmanager

@@ -54,6 +54,8 @@ class ProgramNode:
 
 @dataclass
 class Program:
+    """A file of bytecode, section by section."""
+
     strings: list[str] = field(default_factory=list)
     constants: list[float] = field(default_factory=list)
     parameters: list[int] = field(default_factory=list)  # names, as strings' indices

@@ -144,9 +144,9 @@ def run(arguments: argparse.Namespace) -> int:
     data, left_out = _bytecode(arguments)
     seconds = {"read": time.perf_counter() - started}
 
-    prepare(arguments.output, stored_channel(arguments.output, arguments.linear16))
     from ...runtime import Scene
 
+    prepare(arguments.output, stored_channel(arguments.output, arguments.linear16))
     with Scene(
         data,
         accelerator=_accelerator(arguments),

@@ -21,10 +21,11 @@ from dataclasses import dataclass, field, fields
 from functools import cache
 
 from ..reading.model import Assign, Expression, Mesh, Record, Step, TextureValue, Variants
+from ..reading.records import record
 from ..reading.source import Span
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Node:
     span: Span | None = field(default=None, kw_only=True, compare=False, repr=False)
 
@@ -49,12 +50,12 @@ def _references(kind: type[Node]) -> tuple[str, ...]:
     return tuple(each.name for each in fields(kind) if each.name in names)
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Empty(Node):
     pass
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Symbol(Node):
     """S-node. ``live`` and ``draws`` are filled by the liveness pass: the parameters (names, in slot order) and
     whether the random key matters for the geometry below."""
@@ -65,25 +66,25 @@ class Symbol(Node):
     draws: bool = False
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Rule(Node):
     index: int
     body: int
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Branch(Node):
     test: Expression
     then: int
     otherwise: int
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Choose(Node):
     cases: tuple[tuple[Expression, int], ...]
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Calculate(Node):
     name: str
     statements: tuple[Assign | Variants, ...]
@@ -91,7 +92,7 @@ class Calculate(Node):
     together: bool = False
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Transform(Node):
     """A constant transformation: ``matrix`` is the 3x4 matrix row by row, 12 doubles, p' = M·(p, 1)."""
 
@@ -100,14 +101,14 @@ class Transform(Node):
     child: int
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class TransformCode(Node):
     name: str
     steps: tuple[Step, ...]
     child: int
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Texture(Node):
     name: str
     texture: TextureValue
@@ -115,40 +116,40 @@ class Texture(Node):
     draws: bool = False
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Union(Node):
     children_: tuple[int, ...]
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Enter(Node):
     symbol: int
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Primitive(Node):
     shape: str
     arguments: tuple[Expression, ...] = ()
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class MeshLeaf(Node):
     mesh: int
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class Object(Node):
     name: str
     ordinal: int
     child: int
 
 
-@dataclass(slots=True)
+@record(frozen=False)
 class NoShadow(Node):
     child: int
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class LeftOut:
     """Something a pass removed because the scene doesn't need it: shown by ``--explain`` and in JSON."""
 
@@ -158,6 +159,8 @@ class LeftOut:
 
 @dataclass
 class Graph:
+    """The nodes, the root first, and what else a scene has."""
+
     nodes: list[Node] = field(default_factory=list)
     parameters: list[str] = field(default_factory=list)  # slot order
     settings: Record | None = None

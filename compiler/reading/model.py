@@ -269,6 +269,8 @@ class Definition:
 
 @dataclass
 class Model:
+    """A scene whose names all have a meaning."""
+
     source: Source
     files: list[Path] = field(default_factory=list)  # every file read, the scene's first
     settings: Record | None = None

@@ -25,15 +25,16 @@ T = TypeVar("T")
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))
-def record(cls: type | None = None, *, eq: bool = True) -> Any:
-    """Without ``eq``, objects are equal only to themselves."""
+def record(cls: type | None = None, *, eq: bool = True, frozen: bool = True) -> Any:
+    """Without ``eq``, objects are equal only to themselves. What isn't ``frozen`` may change, and has no hash if it has an ``eq``."""
     if cls is None:
-        return lambda cls: record(cls, eq=eq)
-    return _finished(dataclass(slots=True, eq=False, repr=False)(cls), eq)
+        return lambda cls: record(cls, eq=eq, frozen=frozen)
+    cls.__doc__ = cls.__doc__ or cls.__name__  # for those without, dataclass() reads signatures half as long as all else takes
+    return _finished(dataclass(slots=True, eq=False, repr=False)(cls), eq, frozen)
 
 
-def _finished(cls: Any, eq: bool) -> type:
-    names = [each.name for each in fields(cls)]
+def _finished(cls: Any, eq: bool, frozen: bool) -> type:
+    names = [each.name for each in fields(cls) if each.repr]
 
     def show(self: Any) -> str:
         return f"{cls.__qualname__}({', '.join(f'{name}={getattr(self, name)!r}' for name in names)})"
@@ -44,7 +45,7 @@ def _finished(cls: Any, eq: bool) -> type:
         cls.__eq__ = lambda self, other: (
             values(self) == values(other) if other.__class__ is self.__class__ else NotImplemented
         )
-        cls.__hash__ = lambda self: hash(values(self))
+        cls.__hash__ = (lambda self: hash(values(self))) if frozen else None
     return cls
 
 

@@ -12,7 +12,7 @@ Example::
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Callable, Sequence
 
 from . import syntax, vocabulary
@@ -31,7 +31,7 @@ COMPONENTWISE = frozenset("*/+-")
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-@dataclass(frozen=True)
+@record
 class Scope:
     """What an expression may use where it stands: ``reads`` parameters, ``draws`` random numbers; in a ``block``
     there are axes, vectors and colours, and constant parts are folded."""

@@ -9,13 +9,14 @@ matrix diag(2, 2, 2), phong 0.5 and two entries.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Sequence
 
 from . import affine, syntax, vocabulary
 from .diagnostics import nearest
 from .model import Apply, Constant, Expression, Paint, Read, Step, TextureValue
 from .problems import Problem
+from .records import record
 from .resolve_expressions import BLOCKS, TEXTURES, Expressions, Scope, Value
 from .resolve_items import Items, check_range
 from .resolve_names import Entry, Names
@@ -42,7 +43,7 @@ CHECKERS = (constant_entry(0, 0, 0, 1), constant_entry(0, 0, 1, 0))
 GREYS = (constant_entry(0, 0, 0, 0), constant_entry(1, 1, 1, 1))
 
 
-@dataclass(frozen=True)
+@record
 class Pigment:
     pattern: str = "solid"
     direction: tuple[float, ...] = (1.0, 0.0, 0.0)
@@ -53,7 +54,7 @@ class Pigment:
         return replace(self, matrix=affine.compose(matrix, self.matrix))
 
 
-@dataclass(frozen=True)
+@record
 class Look:
     """A texture; ``finish`` has what is set, by name of the texture record."""
 

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from typing import NamedTuple
 
+from .records import record
 from .vocabulary_rows import COLOURS, ROWS, STOCK_INCLUDES, SYNONYMS, UNSUPPORTED, UNSUPPORTED_DIRECTIVES
 
 __all__ = ["COLOURS", "STOCK_INCLUDES", "SYNONYMS", "UNSUPPORTED", "UNSUPPORTED_DIRECTIVES"]
@@ -49,7 +49,7 @@ class Interval(NamedTuple):
         return f"{low} {'and below' if self.high_open else 'to'} {self.high:,.10g}"
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Row:
     """One row of the table; see the head of grammar/vocabulary.toml for the fields."""
 

@@ -8,7 +8,6 @@ Example::
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import AbstractSet, Hashable, Iterable, Iterator, Mapping, TypeVar
 
 from .evaluate import NotFinite, fold
@@ -31,11 +30,12 @@ from .model import (
     Sum,
     Transform,
 )
+from .records import record
 
 T = TypeVar("T", bound=Hashable)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Way:
     """One way through a production to a leaf (Enter, Primitive, MeshLeaf, Empty). ``guards`` are the tests on it
     with the outcome it needs, ``weights`` the weights of the alternatives it takes."""
