@@ -20,11 +20,12 @@ from hand_models import (
 )
 from plsys.compiler.bytecode.layout_rows import OPCODES
 from plsys.compiler.graph import graph as g
-from plsys.compiler.graph import limits
+from plsys.compiler.graph import limits, passes
 from plsys.compiler.graph.lower import lower
 from plsys.compiler.graph.matrices import STEPS, determinant, is_singular, matrix_of
 from plsys.compiler.graph.printing import print_expression
 from plsys.compiler.graph.verify import InvalidGraph, verify
+from plsys.compiler.pipeline import build_graph
 from plsys.compiler.reading.diagnostics import Diagnostics
 from plsys.compiler.reading.model import Constant, Empty, Enter, NoShadow, Primitive, Read
 
@@ -173,6 +174,15 @@ def broken(graph: g.Graph, index: int, node: g.Node) -> g.Graph:
 def test_the_verifier_names_the_pass_and_the_rule(index, node, rule_broken):
     with pytest.raises(InvalidGraph, match=f"after merge: .*{rule_broken}"):
         verify(broken(lower(tree()), index, node), "merge")
+
+
+def test_a_pass_that_makes_a_wrong_graph_is_named(monkeypatch):
+    def spoil(graph: g.Graph) -> None:
+        graph.nodes[0] = g.Enter(4)
+
+    monkeypatch.setattr(passes, "PASSES", (*passes.PASSES[:2], spoil, *passes.PASSES[2:]))
+    with pytest.raises(InvalidGraph, match="after spoil: .*the root"):
+        build_graph(tree())
 
 
 def test_every_transformation_of_the_bytecode_has_its_matrix():
