@@ -107,7 +107,7 @@ def _special(role: Role, start: int, end: int, parent: Node, text: bytes) -> tup
     """Role and end of a token that holds more than its node's type says."""
     kind = role.kind
     if kind == "<":
-        if text[end : end + 1] == b" " and text[parent.end_byte - 2] != 0x20:
+        if text[end : end + 1] == b" " and not text[parent.end_byte - 2 : parent.end_byte - 1].isspace():
             return _role("< ", role.parent), end
         return role, end
     # The grammar's binary minus between operands that stand side by side has its space with it, and so does a line

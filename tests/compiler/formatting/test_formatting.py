@@ -90,6 +90,10 @@ STYLE = {
         "Calculation    C_long { n=1; }   // one\nTransformation T      { scale 2;  rotz 3; } // two\n",
         "Calculation    C_long { n = 1; } // one\nTransformation T      { scale 2;  rotz 3; } // two\n",
     ),
+    "a vector over lines": (
+        "camera {\nlocation < 1,\n2, 3\n>\n}\n",
+        "camera {\n    location <1,\n        2, 3\n    >\n}\n",
+    ),
     "a body over lines": (
         "union {\nsphere{0,1}\n  texture\n{\npigment{color rgb 1}}}\n",
         "union {\n    sphere { 0, 1 }\n    texture\n    {\n        pigment { color rgb 1 }\n    }\n}\n",
