@@ -73,6 +73,7 @@ class Updates:
     def _closed(self, document: Document | None, uri: str) -> None:
         if document is not None:
             self._changed.pop(document, None)
+            self._preparing = iter(())  # it would keep what is known of the document
             self._touch_all()
         if self._published.pop(uri, (None, []))[1]:
             self.notify("textDocument/publishDiagnostics", {"uri": uri, "diagnostics": []})

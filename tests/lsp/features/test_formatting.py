@@ -92,3 +92,12 @@ def test_what_was_prepared_in_a_pause_is_what_formats(monkeypatch):
         prepared.published()
         while not prepared.session.prepare():
             pass
+
+
+def test_a_closed_file_is_not_prepared_further(monkeypatch):
+    monkeypatch.setattr("plsys.lsp.updates.SLICE", 0.0)
+    editor = Editor("".join(f"Calculation C{i}{{n=1;}}\n" for i in range(40)))
+    editor.published()
+    assert not editor.session.prepare()
+    editor.notify("textDocument/didClose", {"textDocument": {"uri": editor.uri("scene.plsys")}})
+    assert editor.session.prepare()
