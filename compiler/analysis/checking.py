@@ -208,7 +208,7 @@ class Work:
                     new[part] = None
                 is_paused = part is not None and must_pause()
                 if new and (part is None or is_paused or now - told_at > SLICE_S):
-                    found = telling.answer(scene, scene.request, places, new)
+                    found = telling.answer(scene, scene.request, order, places, new)
                     answer(found._replace(share=_share(scene) if now - began > SLICE_S else None))
                     for each in new:
                         each.outcome.is_news = False
@@ -216,7 +216,7 @@ class Work:
                 if is_paused:
                     return False
             if not is_all_told:
-                answer(telling.answer(scene, scene.request, places, new))
+                answer(telling.answer(scene, scene.request, order, places, new))
         return not any(map(_is_due, scene.parts))
 
 

@@ -12,6 +12,7 @@ Example::
 
 from __future__ import annotations
 
+import re
 from typing import Iterator
 
 from ..reading import syntax
@@ -36,6 +37,8 @@ MANY_BLOCKS = 200
 RIGHT_TEXTS = 4
 
 _SINGLE = ("camera", "background")
+
+_QUOTED = re.compile(r"'(\w+)'")  # the names in a message
 
 
 class Following:
@@ -81,19 +84,22 @@ class Following:
         had_edits = bool(self._pending or self._edited or self._dirty)
         if not self.read(deadline):
             return False
-        while self._edited or self._dirty or self._opened:
-            places = None
+        while self._edited or self._dirty or self._opened or self._names.has_doubts:
+            block = places = None
             if self._edited:
                 block, places = self._edited.popitem()
             elif self._dirty:
                 block, places = next(iter(self._dirty.items()))
+            elif self._names.has_doubts:
+                self._settle_doubts(deadline)
             elif had_edits and deadline is not None:
                 return False  # what is known about the edit needs not wait
             else:
                 block = next(iter(self._opened))
-            self._dirty.pop(block, None)
-            self._opened.pop(block, None)
-            self._resolve(block, places)
+            if block is not None:
+                self._dirty.pop(block, None)
+                self._opened.pop(block, None)
+                self._resolve(block, places)
             if deadline is not None and deadline.has_passed():
                 return self.is_current
         return True
@@ -113,7 +119,19 @@ class Following:
     def is_current(self) -> bool:
         """Whether all that the last changes touched has been resolved."""
         read = self._reading is None and not self._pending and self._names.is_fresh
-        return read and not (self._edited or self._dirty or self._opened)
+        return read and not (self._edited or self._dirty or self._opened or self._names.has_doubts)
+
+    def _settle_doubts(self, deadline: Deadline | None) -> None:
+        """Blocks with a wrong name that something else is most like now are to be resolved again."""
+        wrong: dict[str, dict[Block, None]] = {}
+        for block, said in self._messages.items():
+            for name in {name for each in said for name in _QUOTED.findall(each.message)}:
+                wrong.setdefault(name, {})[block] = None
+        for name in self._names.settle_doubts(wrong):
+            if name is not None:
+                self._dirty.update(wrong[name])
+            if deadline is not None and deadline.has_passed():
+                return
 
     def wrong_blocks(self) -> list[Block]:
         """The blocks with errors, if all that changes touched has been resolved; before, none is known for sure."""

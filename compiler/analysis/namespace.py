@@ -12,7 +12,7 @@ Example::
 
 from __future__ import annotations
 
-from typing import Callable, Iterable, Iterator
+from typing import Callable, Container, Iterable, Iterator
 
 from ..reading import syntax, vocabulary
 from ..reading.model import Definition as ModelDefinition
@@ -24,8 +24,11 @@ from .text import Block
 # Definitions whose value others are made of: when one changes, so may what is said about those.
 _VALUES = frozenset(("value", "input", "texture", "pigment", "finish", "color_map", "object"))
 
-# So many wrong names are remembered with what is like them.
-MOST_HINTS = 1024
+# A name that nothing has, and the kinds that are wanted there (None: any).
+Wrong = tuple[str, tuple[str, ...] | None]
+
+# Of more wrong names than that it is asked who still uses them, before what is like them is remembered for ever.
+MANY_HINTS = 1024
 
 _VOCABULARY = {kind: NameIndex(vocabulary_names(kind)) for kind in ("primitive", "function", "constant", "colour")}
 
@@ -51,7 +54,9 @@ class Namespace:
         self._signatures: dict[str, object] = {}
         self._touched: dict[str, None] = {}  # names that may mean something else since the last refresh
         self._names: dict[str, NameIndex] = {}  # by kind, for names that are like a wrong one
-        self._hints: dict[tuple[str, tuple[str, ...] | None], str] = {}  # of wrong names, as long as the others stay
+        self._hints: dict[Wrong, str] = {}  # as long as the other names stay
+        self._room = MANY_HINTS
+        self._doubted: dict[Wrong, str] = {}  # those that were given before others came or went
         self.now = 0  # counts refreshes
         self._changed: dict[str, int] = {}  # in which refresh a name came to mean something else
 
@@ -189,7 +194,7 @@ class Namespace:
                 if entry is not None:
                     self._unname(entry)
                 self._names.setdefault(kind, NameIndex()).add(name)
-                self._hints.clear()
+                self._doubt()
         else:
             entry.value, entry.failed = None, False  # the same syntax may say something else: see retouch.py
         if node is None:
@@ -204,7 +209,13 @@ class Namespace:
 
     def _unname(self, entry: Entry) -> None:
         self._names[entry.kind].remove(entry.definition.name)
-        self._hints.clear()
+        self._doubt()
+
+    def _doubt(self) -> None:
+        """Something else may be most like a wrong name now."""
+        if self._hints:
+            self._doubted = self._hints | self._doubted  # of two hints the earlier one: some were told nothing else yet
+            self._hints = {}
 
     def _defining(self, name: str) -> tuple[syntax.Definition | syntax.Name | None, str]:
         """The syntax of what defines ``name`` (the first, as the compiler sees it), and its kind."""
@@ -237,12 +248,25 @@ class Namespace:
         changed = self._changed
         return all(changed.get(name, 0) <= moment for name in facts.words)
 
+    @property
+    def has_doubts(self) -> bool:
+        """Whether some were told what a wrong name is like, and other names have come or gone since."""
+        return bool(self._doubted)
+
+    def settle_doubts(self, wrong: Container[str]) -> Iterator[str | None]:
+        """The names of ``wrong`` that something else is most like now. None in between, where a pause can be made."""
+        while self._doubted:
+            (name, kinds), hint = self._doubted.popitem()
+            yield name if name in wrong and self.nearest(name, kinds) != hint else None
+        self._room = max(MANY_HINTS, 2 * len(self._hints))
+
     def nearest(self, name: str, kinds: tuple[str, ...] | None) -> str:
         """As Names.nearest of the compiler."""
         hint = self._hints.get((name, kinds))
         if hint is None:
-            if len(self._hints) >= MOST_HINTS:
-                self._hints.clear()
+            if len(self._hints) >= self._room:
+                self._room *= 2
+                self._doubt()
             if kinds is None:
                 indexes = list(self._names.values())
             else:

@@ -5,11 +5,13 @@ Example: ``answer(scene, request, places, new)`` tells what was found out about 
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Iterable, Iterator
 
 from ..reading.diagnostics import Diagnostic
 from ..reading.source import Span
 from .exchange import Answer, Finding, Request
+from .facts import facts_of
 from .insights import Placed, placed
 from .parts import Part
 from .text import Block
@@ -27,10 +29,12 @@ _UNSURE = frozenset((*_MISSING, "unused", "unreachable"))
 PIECE = 256
 
 
-def answer(scene: SceneState, request: Request, places: dict[Block, tuple[int, int]], new: Iterable[Part]) -> Answer:
-    """``new`` are parts of which more is known than was told; ``places`` are the numbers of each block's file and of the
-    block in it."""
-    return _Told(scene, places).answer(request.key, dict.fromkeys(new))
+def answer(
+    scene: SceneState, request: Request, order: dict[Block, int], places: dict[Block, tuple[int, int]], new: Iterable[Part]
+) -> Answer:
+    """``new`` are parts of which more is known than was told; ``order`` is where each block stands in what the compiler
+    reads, ``places`` the numbers of its file and of it there."""
+    return _Told(scene, order, places).answer(request.key, dict.fromkeys(new))
 
 
 def in_pieces(answer: Answer) -> Iterator[Answer]:
@@ -48,8 +52,8 @@ def in_pieces(answer: Answer) -> Iterator[Answer]:
 
 
 class _Told:
-    def __init__(self, scene: SceneState, places: dict[Block, tuple[int, int]]) -> None:
-        self.scene, self.places = scene, places
+    def __init__(self, scene: SceneState, order: dict[Block, int], places: dict[Block, tuple[int, int]]) -> None:
+        self.scene, self.order, self.places = scene, order, places
         self.parts = [part for part in scene.parts if part.outcome is not None]
 
     def answer(self, key: int, new: dict[Part, None]) -> Answer:
@@ -82,6 +86,7 @@ class _Told:
         own: list[Diagnostic] = []
         general: dict[tuple, Diagnostic] = {}
         missing: dict[str, Diagnostic] = {}
+        objects: dict[float, Diagnostic] = {}  # what to place, by where it stands
         for part in self.parts:
             if not part.outcome.diagnostics:
                 continue
@@ -89,14 +94,23 @@ class _Told:
             for each in part.outcome.diagnostics:
                 if is_unsure and each.code in _UNSURE:
                     continue
-                if each.code in _MISSING:
-                    if part is self.scene.parts.base or each.code == "no-object":
+                if each.code == "no-object":
+                    objects[self._first_selection(part)] = each
+                elif each.code in _MISSING:
+                    if part is self.scene.parts.base:
                         missing[each.code] = each
                 elif each.span.source not in blocks:
                     general.setdefault((each.code, each.span.source, each.span.start), each)
                 elif part in told:
                     own.append(each)
+        if objects:
+            missing["no-object"] = objects[min(objects)]
         return own, [*missing.values(), *general.values()]
+
+    def _first_selection(self, part: Part) -> float:
+        """Where the first Selection of a part stands; behind all others: it has none."""
+        has_one = (block for block in part.blocks if any(each.kind == "selection" for each in facts_of(block).definitions))
+        return min((self.order[block] for block in has_one), default=math.inf)
 
     def _place(self, span: Span) -> tuple[int, int, int, int]:
         return (*self.places.get(span.source, (0, 0)), span.start, span.end)  # type: ignore[call-overload]

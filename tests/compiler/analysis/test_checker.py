@@ -5,10 +5,12 @@ from __future__ import annotations
 import queue
 
 import pytest
-from plsys.compiler.analysis import Checker, Project, telling
+from plsys.compiler.analysis import Checker, Project, check_whole, telling
 from plsys.compiler.analysis.checking import Work
 from plsys.compiler.analysis.interruption import Interrupted, Interruption
 from plsys.compiler.analysis.whole import MAX_KNOWN, Result, Snapshot
+from plsys.compiler.commands.check import check_scene
+from plsys.compiler.reading.source import Source
 
 
 @pytest.fixture
@@ -119,3 +121,21 @@ def test_news_that_came_while_nothing_could_be_interrupted():
     with interruption.allowed():
         done.append("the next one")
     assert done == ["the next one"]
+
+
+def test_what_to_place_is_the_first_selection(tmp_path):
+    """Of whichever part: those before and behind it have none, and others. What is included comes before."""
+    other = "#declare A = 1;\nTexture X { pigment { color rgb A } }\n"
+    two = "Selection Trunk { Trunk -> cylinder; }\nSelection Bough { Bough -> cone; }\n"
+    (tmp_path / "first.plsys").write_text("Selection Leaf { Leaf -> disc; }\n")
+    for text, first in ((other, "Tree"), (other + two + other.replace("A", "B").replace("X", "Y"), "Trunk"), (two + '#include "first.plsys"\n', "Trunk"),
+                        (other + '#include "first.plsys"\n' + two, "Leaf")):  # fmt: skip
+        path = tmp_path / "root.plsys"
+        path.write_text(text)
+        project = Project()
+        scene = project.scene_of(project.open(path, text.encode()))
+        project.work()
+        check_whole(scene)
+        told = [m.diagnostic.hint for m in scene.messages(scene.root) if m.diagnostic.code == "no-object"]
+        assert told == [f"to place a Selection, write object {{ {first} }}"]
+        assert told == [each.hint for each in check_scene(Source.read(path))[0] if each.code == "no-object"]

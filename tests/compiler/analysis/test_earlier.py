@@ -77,7 +77,7 @@ def test_what_changed_meanwhile_is_told():
     project.work()
     project.edit(document, at, at + 2, b"")
     assert any(
-        start > RIGHT.index("T_up {") and "'Height'" in said for start, _, _, said in told(project, document)
+        start > RIGHT.index("T_up {") and "'Height'" in said for start, _, _, said, _ in told(project, document)
     )
     check(project, document)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from plsys.compiler.analysis import Deadline, Document, Project, facts_of
+from plsys.compiler.analysis.namespace import MANY_HINTS
 from plsys.compiler.analysis.text import Block
 from plsys.compiler.reading.source import Span
 from stress import rounds
@@ -75,7 +76,7 @@ def known(block: Block) -> list[object]:
 
 def told(project: Project, document: Document) -> list[tuple]:
     project.work()
-    return sorted((m.start, m.end, m.diagnostic.code, m.diagnostic.message) for m in project.messages(document))
+    return sorted((m.start, m.end, m.diagnostic.code, m.diagnostic.message, m.diagnostic.hint) for m in project.messages(document))
 
 
 def used(project: Project, document: Document) -> dict[str, list[tuple]]:
@@ -197,7 +198,7 @@ def test_a_comment_that_is_no_text_any_more_says_so(taken, typed):
     assert told(project, document) == []
     at = document.text.data.index(taken)
     project.edit(document, at, at + len(taken), typed)
-    assert [code for _, _, code, _ in told(project, document)] == ["encoding"]
+    assert [code for _, _, code, *_ in told(project, document)] == ["encoding"]
     check(project, document)
 
 
@@ -290,3 +291,25 @@ def test_what_a_library_no_longer_defines_is_gone_in_all_its_scenes(tmp_path):
     for scene in library.scenes:
         assert [each.diagnostic.message[:19] for each in scene.messages(library)] == ["unknown name 'T_up'"]
         assert set(scene.names()) == {"Tree", "xxT_up"}
+
+
+@pytest.mark.parametrize("many", [0, 2 * MANY_HINTS])
+def test_what_a_wrong_name_is_like_is_looked_up_again(many):
+    """When the name that was named goes, and when one comes that is more like it; beside many other wrong names, too."""
+    project = Project()
+    other = "".join(f"#declare A{i} = B{i};\n" for i in range(many))
+    text = f"object {{ Bracket }}\nSelection Brackets {{ Brackets -> box; }}\n{other}"
+    document = project.open(None, text.encode(), name="x")
+
+    def hint() -> str:
+        project.work()
+        (found,) = (m.diagnostic.hint for m in project.messages(document) if "'Bracket'" in m.diagnostic.message)
+        return found
+
+    assert hint() == "did you mean 'Brackets'?"
+    for old, new in ((b"Brackets {", b"Brackett {"), (b"Brackett {", b"Shelf {"), (b"Shelf {", b"Brakcet {")):
+        at = document.text.data.index(old)
+        project.edit(document, at, at + len(old), new)
+        name = new.split()[0].decode()
+        assert hint() == ("" if name == "Shelf" else f"did you mean '{name}'?")
+        check(project, document)
