@@ -66,6 +66,14 @@ static void *work_create(const pl_scene *scene, pl_error *error)
 
 /* --- down the path --- */
 
+/* A path that may magnify rounding more than so many times is looked at gate by gate. */
+#define BENT 16.0
+
+static double bend_of(const pl_gated *gated, const pl_states *states, uint32_t state, const pl_item *item)
+{
+    return gated->bends ? (double)gated->states[state].bends[item - states->list[state].items] : 1.0;
+}
+
 /* The items of the opened nodes of a front from below its own state down to one, in w->chain, and one more; their number,
  * or 0: no memory. */
 static size_t list_items(pl_gated_work *w, const pl_front *front, uint32_t opened, const pl_item *item, pl_error *error)
@@ -85,12 +93,16 @@ static const pl_item *instance_item(const pl_scene *scene, const pl_front *front
 }
 
 /* Maps a ray from a front's state to an item of an opened node, one transformation after another. */
-static bool map_down(pl_gated_work *w, const pl_front *front, uint32_t opened, const pl_item *item, double o[3],
-                     double d[3], pl_error *error)
+static bool map_down(const pl_scene *scene, pl_gated_work *w, const pl_front *front, uint32_t opened, const pl_item *item,
+                     double o[3], double d[3], double *bend, pl_error *error)
 {
     const size_t count = list_items(w, front, opened, item, error);
-    for (size_t i = 0; i < count; i++)
+    uint32_t state = front->state;
+    for (size_t i = 0; i < count; i++) {
         for (uint32_t k = 0; k < w->chain[i]->transform_count; k++) pl_map_ray(w->chain[i]->transforms[k], o, d);
+        *bend *= bend_of(scene->structure, &scene->states, state, w->chain[i]);
+        state = w->chain[i]->what;
+    }
     return count > 0;
 }
 
@@ -110,6 +122,7 @@ static bool place_down(const pl_scene *scene, pl_gated_work *w, const pl_front *
             pl_map_ray(at->transforms[k], place->o, place->d);
             place->stretch *= at->transforms[k]->stretch;
         }
+        place->bend *= bend_of(gated, states, state, at);
         state = at->what;
     }
     return count > 0;
@@ -133,10 +146,40 @@ static bool place_frame(const pl_scene *scene, pl_gated_work *w, uint32_t index,
     return true;
 }
 
+/* Whether all gates on the path to an opened node of a frame are open, those too that stand in fronts, and the span below
+ * them: 1, 0, or -1: an error. */
+static int pass_all_gates(const pl_scene *scene, pl_gated_work *w, uint32_t frame, uint32_t opened, const pl_query *query,
+                          pl_span *within)
+{
+    const pl_states *states = &scene->states;
+    pl_gated_place place = *pl_gated_place_in(w, 0);
+    uint32_t depth = 0;
+    *within = pl_span_in(states, 0, place.o, place.d, place.within);
+    for (uint32_t i = 0; i <= frame; i++) {
+        const pl_front *front = w->frames[i].at.front;
+        const uint32_t instance = i < frame ? w->frames[i + 1].at.instance : 0;
+        const uint32_t node = i < frame ? front->places[instance].opened : opened;
+        const pl_item *last = i < frame ? instance_item(scene, front, instance) : NULL;
+        const size_t count = list_items(w, front, node, last, query->error);
+        if (!count) return -1;
+        for (size_t k = 0; k < count && w->chain[k]; k++) {
+            const pl_item *item = w->chain[k];
+            for (uint32_t n = 0; n < item->transform_count; n++) {
+                pl_map_ray(item->transforms[n], place.o, place.d);
+                place.stretch *= item->transforms[n]->stretch;
+            }
+            double t_entry;
+            const pl_arrival arrival = {item->what, place.o, place.d, place.stretch, *within, ++depth};
+            if (pl_query_gate(query, states, &arrival, &t_entry, within) != PL_GATE_OPEN) return 0;
+        }
+    }
+    return 1;
+}
+
 void pl_gated_begin(pl_gated_work *w, const pl_ray *ray, double t_min)
 {
     pl_gated_place *place = pl_gated_place_in(w, 0);
-    *place = (pl_gated_place){.stretch = 1.0, .within = {t_min, INFINITY}, .serial = w->frames[0].serial};
+    *place = (pl_gated_place){.stretch = 1.0, .bend = 1.0, .within = {t_min, INFINITY}, .serial = w->frames[0].serial};
     memcpy(place->o, ray->origin, sizeof place->o);
     memcpy(place->d, ray->direction, sizeof place->d);
 }
@@ -180,7 +223,13 @@ bool pl_gated_candidate(pl_tracer *tracer, uint32_t frame, pl_ref ref, pl_query 
     double o[3], d[3];
     memcpy(o, place->o, sizeof o);
     memcpy(d, place->d, sizeof d);
-    if (!map_down(w, front, primitive->opened, item, o, d, query->error)) return false;
+    double bend = place->bend;
+    pl_span within;
+    if (!map_down(scene, w, front, primitive->opened, item, o, d, &bend, query->error)) return false;
+    if (bend > BENT) {
+        const int passed = pass_all_gates(scene, w, frame, primitive->opened, query, &within);
+        if (passed <= 0) return passed == 0;
+    }
     source s = {scene, w, frame, ref};
     pl_leaf leaf = {
         .shape = item->what,
@@ -214,6 +263,10 @@ int pl_gated_arrive(pl_tracer *tracer, uint32_t frame, uint32_t instance, bool c
     if (!place_frame(scene, w, frame, query->error)) return -1;
     pl_gated_place place = *pl_gated_place_in(w, frame);
     if (!place_down(scene, w, front, front->places[instance].opened, item, &place, query->error)) return -1;
+    if (place.bend > BENT) {
+        const int passed = pass_all_gates(scene, w, frame, front->places[instance].opened, query, &place.within);
+        if (passed <= 0) return passed;
+    }
     pl_arrival arrival = {item->what, place.o, place.d, place.stretch, place.within, depth};
     double t_entry;
     switch (pl_query_gate(query, states, &arrival, &t_entry, &place.within)) {

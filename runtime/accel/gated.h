@@ -40,6 +40,7 @@ typedef struct pl_gated_state {
     float farthest_inside; /* … and of the first rung */
     bool unbounded;
     const uint8_t *nested; /* of each item: what it enters has its box within this state's (gated_build.c) */
+    const float *bends;    /* of each item: how many times it may magnify rounding (gated_build.c) */
 } pl_gated_state;
 
 typedef struct pl_gated {
@@ -47,13 +48,14 @@ typedef struct pl_gated {
     pl_gated_rung *rungs;
     uint32_t count, capacity; /* of rungs */
     uint8_t *nested;
+    float *bends; /* NULL: no state is endless */
     pl_fronts sums; /* counts and bytes of the rungs */
     size_t bytes;
 } pl_gated;
 
 /* A ray in the frame of a state, mapped down the path, and what gates need to know of the path. */
 typedef struct pl_gated_place {
-    double o[3], d[3], stretch;
+    double o[3], d[3], stretch, bend; /* bend: the product of the items' */
     pl_span within;  /* of the instances above, and of this one as far as it is needed */
     uint64_t serial; /* of the frame that this is the place in */
 } pl_gated_place;

@@ -85,6 +85,37 @@ static bool find_nested(building *b)
     return true;
 }
 
+/* Gates of endless states allow for some roundings (endless.c), not for all that maps which bend space could magnify: then a hit
+ * may lie far outside the boxes around it, which isn't one of what these hold. Where what stands below has an end, the
+ * slack of its gates tells what it magnifies. */
+static float bend_of(const pl_states *states, const pl_state *state, const pl_item *item)
+{
+    if (!state->endless) return 1.0f;
+    double bend = 1.0;
+    for (uint32_t i = 0; i < item->transform_count; i++)
+        bend *= pl_largest_stretch(&item->transforms[i]->to_parent) * pl_largest_stretch(&item->transforms[i]->to_object);
+    const pl_state *below = item->kind == PL_NODE_ENTER ? &states->list[item->what] : NULL;
+    if (below && !below->endless) bend *= fmax(1.0, below->bounds->gate.gain / PL_REACH_ROUNDINGS);
+    return bend < 1e30 ? (float)bend : 1e30f;
+}
+
+static bool find_bends(building *b)
+{
+    const pl_states *states = &b->scene->states;
+    size_t total = 0;
+    for (uint32_t i = 0; i < states->count; i++) total += states->list[i].item_count;
+    if (!states->list[0].endless) return true;
+    float *bends = b->gated->bends = malloc((total + 1) * sizeof *bends);
+    if (!bends) return pl_fail_memory(b->error, "building the rungs");
+    b->gated->bytes += (total + 1) * sizeof *bends;
+    for (uint32_t i = 0; i < states->count; i++) {
+        const pl_state *state = &states->list[i];
+        b->gated->states[i].bends = bends;
+        for (uint32_t k = 0; k < state->item_count; k++) *bends++ = bend_of(states, state, &state->items[k]);
+    }
+    return true;
+}
+
 /* --- gates --- */
 
 /* The |ray origin| in a state's frame, mapped on by to_object, up to which an endless state isn't cut for being a blur. */
@@ -350,7 +381,7 @@ bool pl_gated_build(pl_scene *scene, pl_error *error)
     scene->structure = gated;
     if (ok && (!gated || !large || !(gated->states = calloc(count, sizeof *gated->states)) || !(b.worthy = find_worthy(&b))))
         ok = pl_fail_memory(error, "building the rungs");
-    ok = ok && find_nested(&b);
+    ok = ok && find_nested(&b) && find_bends(&b);
     if (ok) b.fixed = gated->bytes + sizeof *gated + count * sizeof *gated->states;
     ok = ok && choose_rungs(&b, large);
     pl_compositions_free(b.compositions);
@@ -375,6 +406,7 @@ void pl_gated_destroy(pl_scene *scene)
     free(gated->rungs);
     free(gated->states);
     free(gated->nested);
+    free(gated->bends);
     free(gated);
 }
 

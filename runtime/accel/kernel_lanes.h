@@ -59,7 +59,7 @@ static inline bool quadric_lanes(wide_interval *i, unsigned lanes, wide a, wide 
     const wide bent = _mm256_cmp_ps(a, wide_set(1e-30f), _CMP_GT_OQ), zero = wide_set(0.0f);
     const wide missed = wide_and(bent, _mm256_cmp_ps(discriminant, zero, _CMP_LT_OQ));
     if (!(lanes & ~wide_mask_of(missed))) return false;
-    const wide root = _mm256_sqrt_ps(wide_max(discriminant, zero)), over = wide_set(1.0f) / a;
+    const wide root = _mm256_sqrt_ps(wide_max(zero, discriminant)), over = wide_set(1.0f) / a; /* NaN rules nothing out */
     const wide near_t = _mm256_blendv_ps(wide_set(-1e30f), (-b - root) * over, bent);
     const wide far_t = _mm256_blendv_ps(wide_set(1e30f), (root - b) * over, bent);
     i->enter = wide_max(near_t, i->enter);

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import whole
+from instruction_sets import available
 
 from plsys.compiler.pipeline import build
 from plsys.compiler.reading.source import Source
@@ -88,6 +89,62 @@ def test_what_no_rounding_can_tell_apart_is_met_by_every_accelerator(rest):
     for name, found in zip(ACCELERATORS[1:], hits[1:]):
         for field in ("t", "primitive", "depth", "normal"):
             np.testing.assert_array_equal(getattr(found, field), getattr(hits[0], field), err_msg=f"{name}: {field}")
+
+
+# A map that lacks little of being singular, met from far away: rounding moves hits out of the boxes around them.
+SINGULAR = """
+object { Root scale 0.5 translate <-1, 0, 0> }
+Selection S0
+{
+    S0 -> [ trans -0.926 -0.885 -0.0252; roty 34.9; scale 0.42 ] S1 + box
+        + [ scale -0.141309 -0.168093 0.459518; scale 20.8551 0.00359772 0.0107109; ] cylinder + [ scale 0.495 ] S1;
+}
+Selection S1
+{
+    S1 -> [ rotx 28.44; matrix 1 1 0  1 1.00000024838 0  0 0 1  0 0 0.78; ] sphere
+        + [ shear 0.485 0 -0.185 0 0 -0.429; ] [ trans -0.264 -0.323 0.421; roty -33.1; scale 0.562 ] S0 + sphere;
+}
+Selection Root { Root -> S0 + [ trans 1 0 1; scale -1 1 0.6 ] S0; }
+"""
+FROM_AFAR = (
+    [(-21.63878374809666, -0.6145833049407701, 0.3014733739382358), (74862662.11732459, -38007733.32436264, 54323050.93011382),
+     (-43745340.97026751, -77820719.04695381, 45058640.6431775), (-52407209.71277015, 51946515.56630968, -67491065.76328897)],
+    [(1e-05, 0.0, 0.0), (-0.822050746867668, 0.4173547065144534, -0.5965096898887777),
+     (0.6826245380373616, 1.214354095349309, -0.7031179553729191), (1.366791073061848, -1.3547761310328221, 1.7601812803787436)],
+)  # fmt: skip
+
+# Flat cones, 27 levels down: in their frames a packet's rays are farther away than the square of a single precision number tells.
+FLAT = """
+object { Root scale 0.5 translate <-1, 0, 0> }
+object { Root scale <1, -1, 1> }
+Selection S0 { S0 -> sphere + [ a = rand(1) ] [ scale 0.412 ] S1; }
+Selection S1
+{
+    S1 -> [ scale 1e6 1e-6 1; rotz -52.9; ] cone
+        + [ shear 0.427 0 -0.118 0 0 -0.314; ] [ trans 0.819 0.738 0.293; roty 20.2; scale 0.375 ] S1
+        + [ scale 0.3 + abs(a)*0.2; ] sphere;
+}
+Selection Root { Root -> S0 + [ a = 1; trans 1 0 1; scale -1 1 0.6 ] S1; }
+"""
+TOGETHER = (
+    [(-0.6115223026085055, 0.1878348925860158, -0.09227328015633551), (-0.6115223026344314, 0.1878348925860158, -0.09227328013040959),
+     (-0.6115223026603573, 0.1878348925860158, -0.09227328010448366), (-0.6115223027122092, 0.1878348925860158, -0.09227328002670589)],
+    [(0.0, -1.0, 0.0)] * 4,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("text, rays, found", [(SINGULAR, FROM_AFAR, 1), (FLAT, TOGETHER, 4)], ids=["singular", "flat"])
+def test_hits_that_rounding_moves_far_are_the_same_by_every_accelerator(text, rays, found):
+    data = compiled(view((3, -6, 1), (0, 0, 0)) + text)
+    with Scene(data, accelerator="none") as scene:
+        expected = scene.intersect(*rays)
+    assert np.count_nonzero(np.isfinite(expected.t)) == found
+    ways = [{"accelerator": name} for name in ("boxes", "grid")]
+    ways += [{"isa": isa, "front_items": items} for isa in available(data) for items in (1, 7, 2**64 - 1)]
+    for way in ways:
+        with Scene(data, **way) as scene:
+            for field in ("t", "depth", "normal"):
+                np.testing.assert_array_equal(getattr(scene.intersect(*rays), field), getattr(expected, field), err_msg=f"{way}: {field}")
 
 
 @pytest.mark.parametrize("name", ["tree", "menger", "palm"])
