@@ -27,7 +27,7 @@ _VALUES = frozenset(("value", "input", "texture", "pigment", "finish", "color_ma
 # A name that nothing has, and the kinds that are wanted there (None: any).
 Wrong = tuple[str, tuple[str, ...] | None]
 
-# Of more wrong names than that it is asked who still uses them, before what is like them is remembered for ever.
+# When more hints than this are kept, it is asked which of their wrong names are still there.
 MANY_HINTS = 1024
 
 _VOCABULARY = {kind: NameIndex(vocabulary_names(kind)) for kind in ("primitive", "function", "constant", "colour")}
@@ -55,7 +55,7 @@ class Namespace:
         self._touched: dict[str, None] = {}  # names that may mean something else since the last refresh
         self._names: dict[str, NameIndex] = {}  # by kind, for names that are like a wrong one
         self._hints: dict[Wrong, str] = {}  # as long as the other names stay
-        self._room = MANY_HINTS
+        self._room = MANY_HINTS  # for hints, before that is asked
         self._doubted: dict[Wrong, str] = {}  # those that were given before others came or went
         self.now = 0  # counts refreshes
         self._changed: dict[str, int] = {}  # in which refresh a name came to mean something else

@@ -92,6 +92,15 @@ static const pl_item *instance_item(const pl_scene *scene, const pl_front *front
     return pl_front_item(&scene->states, front->places[instance].item);
 }
 
+/* Maps a ray through one item, and the product of stretches with it. */
+static inline void step_down(const pl_item *item, pl_gated_place *place)
+{
+    for (uint32_t k = 0; k < item->transform_count; k++) {
+        pl_map_ray(item->transforms[k], place->o, place->d);
+        place->stretch *= item->transforms[k]->stretch;
+    }
+}
+
 /* Maps a ray from a front's state to an item of an opened node, one transformation after another. */
 static bool map_down(const pl_scene *scene, pl_gated_work *w, const pl_front *front, uint32_t opened, const pl_item *item,
                      double o[3], double d[3], double *bend, pl_error *error)
@@ -118,10 +127,7 @@ static bool place_down(const pl_scene *scene, pl_gated_work *w, const pl_front *
         const pl_item *at = w->chain[i];
         if (!gated->states[state].nested[at - states->list[state].items])
             place->within = pl_span_in(states, state, place->o, place->d, place->within);
-        for (uint32_t k = 0; k < at->transform_count; k++) {
-            pl_map_ray(at->transforms[k], place->o, place->d);
-            place->stretch *= at->transforms[k]->stretch;
-        }
+        step_down(at, place);
         place->bend *= bend_of(gated, states, state, at);
         state = at->what;
     }
@@ -164,11 +170,8 @@ static int pass_all_gates(const pl_scene *scene, pl_gated_work *w, uint32_t fram
         if (!count) return -1;
         for (size_t k = 0; k < count && w->chain[k]; k++) {
             const pl_item *item = w->chain[k];
-            for (uint32_t n = 0; n < item->transform_count; n++) {
-                pl_map_ray(item->transforms[n], place.o, place.d);
-                place.stretch *= item->transforms[n]->stretch;
-            }
             double t_entry;
+            step_down(item, &place);
             const pl_arrival arrival = {item->what, place.o, place.d, place.stretch, *within, ++depth};
             if (pl_query_gate(query, states, &arrival, &t_entry, within) != PL_GATE_OPEN) return 0;
         }

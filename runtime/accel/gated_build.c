@@ -69,22 +69,6 @@ static bool is_nested(const pl_states *states, const pl_state *state, const pl_i
     return m * n * inner->gain <= 3.0 * outer->gain && m * (inner->gain * offset + inner->base) <= 3.0 * outer->base;
 }
 
-static bool find_nested(building *b)
-{
-    const pl_states *states = &b->scene->states;
-    size_t total = 0;
-    for (uint32_t i = 0; i < states->count; i++) total += states->list[i].item_count;
-    uint8_t *nested = b->gated->nested = malloc(total + 1);
-    if (!nested) return pl_fail_memory(b->error, "building the rungs");
-    b->gated->bytes += total + 1;
-    for (uint32_t i = 0; i < states->count; i++) {
-        const pl_state *state = &states->list[i];
-        b->gated->states[i].nested = nested;
-        for (uint32_t k = 0; k < state->item_count; k++) *nested++ = is_nested(states, state, &state->items[k]);
-    }
-    return true;
-}
-
 /* Gates of endless states allow for some roundings (endless.c), not for all that maps which bend space could magnify: then a hit
  * may lie far outside the boxes around it, which isn't one of what these hold. Where what stands below has an end, the
  * slack of its gates tells what it magnifies. */
@@ -99,19 +83,24 @@ static float bend_of(const pl_states *states, const pl_state *state, const pl_it
     return bend < 1e30 ? (float)bend : 1e30f;
 }
 
-static bool find_bends(building *b)
+static bool find_nested_and_bends(building *b)
 {
     const pl_states *states = &b->scene->states;
     size_t total = 0;
     for (uint32_t i = 0; i < states->count; i++) total += states->list[i].item_count;
-    if (!states->list[0].endless) return true;
-    float *bends = b->gated->bends = malloc((total + 1) * sizeof *bends);
-    if (!bends) return pl_fail_memory(b->error, "building the rungs");
-    b->gated->bytes += (total + 1) * sizeof *bends;
+    const bool endless = states->list[0].endless;
+    uint8_t *nested = b->gated->nested = malloc(total + 1);
+    float *bends = b->gated->bends = endless ? malloc((total + 1) * sizeof *bends) : NULL;
+    if (!nested || (endless && !bends)) return pl_fail_memory(b->error, "building the rungs");
+    b->gated->bytes += (total + 1) * (sizeof *nested + (endless ? sizeof *bends : 0));
     for (uint32_t i = 0; i < states->count; i++) {
         const pl_state *state = &states->list[i];
+        b->gated->states[i].nested = nested;
         b->gated->states[i].bends = bends;
-        for (uint32_t k = 0; k < state->item_count; k++) *bends++ = bend_of(states, state, &state->items[k]);
+        for (uint32_t k = 0; k < state->item_count; k++) {
+            *nested++ = is_nested(states, state, &state->items[k]);
+            if (endless) *bends++ = bend_of(states, state, &state->items[k]);
+        }
     }
     return true;
 }
@@ -381,7 +370,7 @@ bool pl_gated_build(pl_scene *scene, pl_error *error)
     scene->structure = gated;
     if (ok && (!gated || !large || !(gated->states = calloc(count, sizeof *gated->states)) || !(b.worthy = find_worthy(&b))))
         ok = pl_fail_memory(error, "building the rungs");
-    ok = ok && find_nested(&b) && find_bends(&b);
+    ok = ok && find_nested_and_bends(&b);
     if (ok) b.fixed = gated->bytes + sizeof *gated + count * sizeof *gated->states;
     ok = ok && choose_rungs(&b, large);
     pl_compositions_free(b.compositions);
