@@ -259,11 +259,15 @@ def within(spot: Spot, match: re.Match, message: Message) -> Found:
     sides = re.fullmatch(r"(.+?)\s*([!=])=\s*(.+)", spot.text, re.DOTALL)
     if sides is None:
         return None
-    written = f"abs({sides[1]} - {sides[3]}) {'<' if sides[2] == '=' else '>='} 0.001"
+    left = sides[1] if re.fullmatch(r"[\w.+*/() -]+", sides[1]) else f"({sides[1]})"
+    right = sides[3] if re.fullmatch(r"[\w.]+(?:\([\w., ]*\))?", sides[3]) else f"({sides[3]})"
+    written = f"abs({left} - {right}) {'<' if sides[2] == '=' else '>='} 0.001"
     return "Compare with a tolerance", [spot.replace(written)]
 
 
 def without_zeros(spot: Spot, match: re.Match, message: Message) -> Found:
+    if not spot.text.startswith("scale"):
+        return None  # a matrix has zeros that are right
     written = re.sub(r"(?<![\w.])0(?:\.0+)?(?![\w.])", "1", spot.text)
     return ("Leave that axis at 1", [spot.replace(written)]) if written != spot.text else None
 

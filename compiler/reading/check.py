@@ -69,8 +69,16 @@ def outcomes_of(symbol: Symbol, seed: float) -> list[Diagnostic]:
                 said.add(id(test))
                 _literal_guard(test, seed, found)
     if not any(way.is_rule and is_open(way, seed) for way in several):
-        found.add("no-rule", symbol.name_span, f"no rule of '{symbol.name}' can apply: it produces nothing")
+        named = {name for way in several for test, needed in way.guards if decided(test, seed) is (not needed) for name in _switches(test)}
+        where = f" where {' and '.join(f'{name} is {value:g}' for name, value in sorted(named))}" if named else ""
+        found.add("no-rule", symbol.name_span, f"no rule of '{symbol.name}' can apply{where}: it produces nothing")
     return found.items
+
+
+def _switches(test: Expression) -> list[tuple[str, float]]:
+    """The inputs and named constants of a guard, which may be something else in another run, with what they are."""
+    constants = [part for part in parts(test) if isinstance(part, Constant) and part.span is not None]
+    return [(part.span.text, part.value) for part in constants if part.span.text.isidentifier()]
 
 
 def _literal_guard(test: Expression, seed: float, diagnostics: Diagnostics) -> None:

@@ -32,6 +32,9 @@ _NEEDS = {
     ("not_equal", True): "", ("equal", False): "",
 }  # fmt: skip
 
+# Whether a guard stops a counter (or lets it go on), and whether it falls → the comparison that it can't step over.
+_TOWARDS = {(False, True): ">", (False, False): "<", (True, True): "<=", (True, False): ">="}
+
 
 class Need(NamedTuple):
     """A guard on a way: ``quantity`` has to be above 0 (side '>'), below ('<'), or different from it ('')."""
@@ -61,7 +64,8 @@ def _report(edges: list[Back], starts: Starts, diagnostics: Diagnostics) -> None
                 start, step, name, bound = missed
                 span = need.test.span or symbol.name_span
                 message = f"'{name}' goes from {start:g} in steps of {step:g} and never is exactly {bound:g}"
-                operator = ">" if step < 0 else "<"
+                stops = isinstance(need.test, Apply) and need.test.operation == "equal"
+                operator = _TOWARDS[stops, step < 0]
                 hint = f"the recursion doesn't end there: write {name} {operator} {bound:g}"
                 diagnostics.add("steps-over", span, message, hint)
                 return

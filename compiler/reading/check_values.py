@@ -16,6 +16,7 @@ from . import affine
 from .diagnostics import Diagnostic, Diagnostics
 from .evaluate import NotFinite, fold
 from .intervals import ALL, Ask, Interval, interval_of, known_of
+from .linear import COMPARISONS
 from .model import Apply, Assign, Calculate, Constant, Expression, Operator, Production, Read, Step, Transform
 from .source import Span
 from .view import View, operators_in, own_expressions
@@ -173,6 +174,8 @@ def _values(expressions: Iterable[Expression], seed: float) -> list[Diagnostic]:
 
 
 def _is_inexact(comparison: Apply) -> bool:
+    if all(isinstance(side, Apply) and side.operation in COMPARISONS for side in comparison.arguments):
+        return False  # both are 0 or 1
     return any(
         (isinstance(part, Constant) and part.value != int(part.value))
         or (isinstance(part, Apply) and part.operation in INEXACT)

@@ -124,7 +124,18 @@ WHOLE = [
      "object { A }\nSelection A { [ rounds = 10 ] A; if (rounds > 0) A -> box + [ trans 0 0 1 ] [ --rounds ] A; }"),
     ("identity-cycle", "object { A }\nSelection A { [ n = 3 ] A; if (n > 0) A -> box + A; else A -> sphere; }",
      "object { A }\nSelection A { [ rounds = 10 ] [ n = 3 ] A; if (rounds > 0 && n > 0) A -> box + [ --rounds ] A; else A -> sphere; }"),
-    ("steps-over", "object { A }\nSelection A { [ n = 5 ] A; if (n != 0) A -> box + [ n -= 2; trans 0 0 1 ] A; }", None),
+    ("steps-over", "object { A }\nSelection A { [ n = 5 ] A; if (n != 0) A -> box + [ n -= 2; trans 0 0 1 ] A; }",
+     "object { A }\nSelection A { [ n = 5 ] A; if (n > 0) A -> box + [ n -= 2; trans 0 0 1 ] A; }"),
+    ("steps-over", "object { A }\nSelection A { [ n = 5 ] A; if (n == 0) A -> sphere; else A -> box + [ n -= 2; trans 0 0 1 ] A; }",
+     "object { A }\nSelection A { [ n = 5 ] A; if (n <= 0) A -> sphere; else A -> box + [ n -= 2; trans 0 0 1 ] A; }"),
+    ("steps-over", "object { A }\nSelection A { [ n = 5 ] A; if (0 == n) A -> sphere; else A -> box + [ n -= 2; trans 0 0 1 ] A; }",
+     "object { A }\nSelection A { [ n = 5 ] A; if (n <= 0) A -> sphere; else A -> box + [ n -= 2; trans 0 0 1 ] A; }"),
+    ("steps-over", "object { A }\nSelection A { [ n = 5 ] A; if (!(n == 10)) A -> box + [ n += 2; trans 0 0 1 ] A; }",
+     "object { A }\nSelection A { [ n = 5 ] A; if (!(n >= 10)) A -> box + [ n += 2; trans 0 0 1 ] A; }"),
+    ("float-equality", "object { A }\nSelection A { [ n = rand(0); m = rand(1) ] A; if (n == m - 0.1) A -> box; }",
+     "object { A }\nSelection A { [ n = rand(0); m = rand(1) ] A; if (abs(n - (m - 0.1)) < 0.001) A -> box; }"),
+    ("float-equality", "object { A }\nSelection A { [ n = rand(0) ] A; if (n > 0.5 != n) A -> box; }",
+     "object { A }\nSelection A { [ n = rand(0) ] A; if (abs((n > 0.5) - n) >= 0.001) A -> box; }"),
 ]  # fmt: skip
 
 
@@ -146,6 +157,12 @@ def test_fixes(code, before, after):
 ])  # fmt: skip
 def test_no_fix_where_only_the_author_knows(rule, code):
     assert fixed(f"#declare Height = 2;\nSelection A {{ A -> {rule}; }}\nSelection B {{ B -> box; }}", code) == {}
+
+
+def test_a_matrix_isnt_filled_with_ones():
+    text = "object { A }\nSelection A { A -> [ matrix 1 0 0  0 0 0  0 0 1  0 0 0 ] box + disc; }"
+    assert "singular" in [each.diagnostic.code for each in messages(HEAD + text)]
+    assert fixed(HEAD + text, "singular") == {}
 
 
 @pytest.mark.parametrize("code, before, after", WHOLE, ids=[f"{i}-{row[0]}" for i, row in enumerate(WHOLE)])

@@ -195,6 +195,11 @@ def test_recursions_without_a_proof(rules, code):
     assert codes(f"Selection A {{ [ n = 4 ] A; {rules} }} object {{ A }}") == [code]
 
 
+def test_comparing_truths_is_exact():
+    text = "Selection A { [ n = rand(0); m = 1 ] A; if ((n > 0.5) == (0.3 > m)) A -> box; else A -> sphere; } object { A }"
+    assert codes(text) == []
+
+
 def test_a_recursion_without_end_that_hardly_shrinks():
     text = "Selection A { A -> box + [ trans 0 0 1; scale 0.999 ] A; } object { A }"
     assert codes(text) == ["slow-contraction"]
