@@ -9,14 +9,22 @@ import asyncio
 import inspect
 import json
 import logging
+import re
+from threading import Event
 from typing import Any
 
+from pygls.io_ import run_websocket
 from pygls.lsp.server import LanguageServer
 from pygls.protocol import LanguageServerProtocol, default_converter
+from websockets.asyncio.server import ServerConnection, serve
 
 from .server import Dispatcher
 
 logger = logging.getLogger(__name__)
+
+# Which pages may connect: those of this machine and of editors. Any other page that is open in a browser could read files with
+# what the server tells. What is no page has no origin.
+ORIGINS = (None, re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?"), re.compile(r"vscode-webview://[\w.-]+"))
 
 
 class Protocol(LanguageServerProtocol):
@@ -44,6 +52,24 @@ class Protocol(LanguageServerProtocol):
 class Server(LanguageServer):
     def __init__(self) -> None:
         super().__init__("plsys", "1", protocol_cls=Protocol, converter_factory=default_converter)
+
+    def start_ws(self, host: str, port: int) -> None:
+        """As pygls', which lets pages from anywhere connect."""
+        self._stop_event = stop = Event()
+
+        async def connected(websocket: ServerConnection) -> None:
+            await run_websocket(websocket, stop, self.protocol, logger, self.report_server_error)
+            self.shutdown()
+
+        async def served() -> None:
+            self._server = await serve(connected, host, port, origins=ORIGINS)
+            async with self._server:
+                await self._server.serve_forever()
+
+        try:
+            asyncio.run(served())
+        except asyncio.CancelledError:
+            logger.debug("the session is over")
 
     def report_server_error(self, error: Exception, source: Any) -> None:
         logger.error("%s: %s", source, error)

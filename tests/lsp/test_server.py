@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import pytest
 from plsys.lsp.server import read_message
@@ -116,20 +117,39 @@ def test_the_end_of_input_ends_the_server():
     assert client.process.wait(10) == 1
 
 
-@pytest.mark.parametrize("transport", ["--tcp", "--ws"])
-def test_a_session_on_a_socket(transport):
-    """One request and its answer; framing is the transport's."""
+INITIALIZE = json.dumps({"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"capabilities": {}}})
+
+
+@contextmanager
+def served(transport):
+    """The port of a server on a socket."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     process = subprocess.Popen([sys.executable, "-m", "plsys.compiler.cli", "lsp", transport, str(port)])
-    body = json.dumps({"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"capabilities": {}}})
     try:
-        answer = over_tcp(port, body) if transport == "--tcp" else over_ws(port, body)
-        assert answer["result"]["serverInfo"]["name"] == "plsys"
+        yield port
     finally:
         process.kill()
         process.wait()
+
+
+@pytest.mark.parametrize("transport", ["--tcp", "--ws"])
+def test_a_session_on_a_socket(transport):
+    """One request and its answer; framing is the transport's."""
+    with served(transport) as port:
+        answer = over_tcp(port, INITIALIZE) if transport == "--tcp" else over_ws(port, INITIALIZE)
+        assert answer["result"]["serverInfo"]["name"] == "plsys"
+
+
+def test_pages_from_elsewhere_may_not_connect():
+    refused = pytest.importorskip("websockets.exceptions").InvalidStatus
+    with served("--ws") as port:
+        with pytest.raises(refused):
+            over_ws(port, INITIALIZE, origin="https://elsewhere.example")
+        with pytest.raises(refused):
+            over_ws(port, INITIALIZE, origin="https://localhost.elsewhere.example")
+        assert over_ws(port, INITIALIZE, origin="http://localhost:3000")["id"] == 1
 
 
 def until_served(connect):
@@ -148,8 +168,8 @@ def over_tcp(port: int, body: str) -> dict:
             return json.loads(read_message(stream))
 
 
-def over_ws(port: int, body: str) -> dict:
+def over_ws(port: int, body: str, origin: str | None = None) -> dict:
     client = pytest.importorskip("websockets.sync.client")
-    with until_served(lambda: client.connect(f"ws://127.0.0.1:{port}")) as connection:
+    with until_served(lambda: client.connect(f"ws://127.0.0.1:{port}", origin=origin)) as connection:
         connection.send(body)
         return json.loads(connection.recv(timeout=20))
