@@ -68,8 +68,10 @@ def preview_place(request: Request) -> tuple[int, int] | None:
 
 
 def resolve(request: Request) -> dict[str, Any]:
-    """Count the references when the lens comes into view."""
+    """Count the references when the lens comes into view; a lens without ``data`` is whole already."""
     lens = dict(request.params)
+    if "data" not in lens:
+        return lens
     data = lens["data"]
     about = Request(request.workspace, {"textDocument": {"uri": data["uri"]}}, request.client)
     places = [place for place in about.scene.uses(data["name"]) if place.role != "definition"]

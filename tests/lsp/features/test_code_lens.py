@@ -38,6 +38,12 @@ def test_references_can_be_shown():
     assert position == lens["range"]["start"] and [editor.spot(each) for each in locations][0] == "scene.plsys:2:10 A"
 
 
+def test_what_is_whole_is_answered_as_it_is():
+    editor = Editor(SCENE)
+    preview = next(each for each in editor.in_file("textDocument/codeLens") if "command" in each)
+    assert editor.request("codeLens/resolve", preview) == preview
+
+
 def test_a_library_has_no_preview():
     assert lenses(Editor("Transformation T { scale 2; }\n")) == [("T", "0 references")]
 
