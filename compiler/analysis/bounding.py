@@ -9,6 +9,8 @@ Example: ``Selection A { A -> box + T A; }`` becomes
 
 from __future__ import annotations
 
+from typing import Iterator
+
 from ..reading import syntax
 from .actions import Spot, TextEdit, fresh_name, name_of, rules, terms, uses_at
 from .document import Place
@@ -46,6 +48,21 @@ def _has_other_entrance(scene: Scene, node: syntax.Selection, back: set[str]) ->
     return any(_owner(place) not in reached for name in others for place in uses_at(scene, name))
 
 
+def _goes_round_elsewhere(scene: Scene, others: set[str]) -> bool:
+    """Whether a way round leads through ``others`` only, where nothing would count."""
+    for start in others:
+        reached, waiting = set(), [start]
+        while waiting:
+            meaning = scene.meaning(waiting.pop())
+            if meaning is not None and isinstance(meaning.node, syntax.Selection):
+                new = (produced_names(meaning.node) & others) - reached
+                reached |= new
+                waiting += new
+        if start in reached:
+            return True
+    return False
+
+
 def _owner(place: Place) -> str:
     """The Selection round a place; '' for a scene block."""
     block, base = place.document.text.block_at(place.start)
@@ -66,6 +83,8 @@ def bounded(spot: Spot, node: syntax.Selection) -> list[TextEdit]:
     back = leads_back(spot.scene, node)
     if node.name.name not in back or not node.productions or _has_other_entrance(spot.scene, node, back):
         return []
+    if _goes_round_elsewhere(spot.scene, back - {node.name.name}):
+        return []
     counter, base = fresh_name(spot.scene, "rounds"), spot.base
     edits = [_entry(spot, node, base, counter)]
     for production in node.productions:
@@ -83,6 +102,8 @@ def bounded(spot: Spot, node: syntax.Selection) -> list[TextEdit]:
                 spot.edit(base + item.span.start, base + item.span.start, f"[ --{counter} ] ")
                 for item in found
             ]
+            if guard is None and any(rule is each for each in _takes_else(production)):
+                return []
             if guard is None:
                 edits.append(
                     spot.edit(base + rule.span.start, base + rule.span.start, f"if ({counter} > 0) ")
@@ -96,6 +117,15 @@ def bounded(spot: Spot, node: syntax.Selection) -> list[TextEdit]:
             if needs_brackets:
                 edits.append(spot.edit(end, end, ")"))
     return sorted(edits, key=lambda edit: edit.start)
+
+
+def _takes_else(node: syntax.Production | None, outer: bool = False) -> Iterator[syntax.Rule]:
+    """The rules before which another `if` would take the `else` of one further out; ``outer``: there is such a one."""
+    while isinstance(node, syntax.If):
+        yield from _takes_else(node.then, outer or node.otherwise is not None)
+        node = node.otherwise
+    if node is not None and outer:
+        yield node
 
 
 def _entry(spot: Spot, node: syntax.Selection, base: int, counter: str) -> TextEdit:

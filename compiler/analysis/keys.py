@@ -18,7 +18,7 @@ def enters_keys(scene: Scene, name: str) -> bool:
     meaning = scene.meaning(name)
     node = meaning.node if meaning is not None else None
     if isinstance(node, syntax.Calculation):
-        return _has_variants(node.statements)
+        return has_variants(node.statements)
     return isinstance(node, syntax.Selection) and _draws(scene, name)
 
 
@@ -43,5 +43,6 @@ def _draws(scene: Scene, name: str) -> bool:
     return False
 
 
-def _has_variants(statements: tuple[syntax.Statement, ...]) -> bool:
+def has_variants(statements: tuple[syntax.Statement, ...]) -> bool:
+    """Whether the name of what has these statements, or that it has none, is part of random keys."""
     return any(isinstance(each, syntax.Operation) and each.name.name == "variants" for each in statements)

@@ -15,6 +15,7 @@ from .actions import Action, Spot, TextEdit, fresh_name, terms, uses_at
 from .bounding import ROUNDS, bounded
 from .document import Document, Place
 from .facts import facts_of
+from .keys import has_variants
 from .parameterise import parameterised
 from .scene import Scene
 
@@ -57,7 +58,7 @@ def _extract(spot: Spot) -> Iterator[Action]:
             ):
                 continue
             kinds = {_kind(statement) for statement in item.statements}
-            if len(kinds) != 1:
+            if len(kinds) != 1 or has_variants(item.statements):
                 continue
             kind = kinds.pop()
             name = fresh_name(spot.scene, "T_new" if kind == "Transformation" else "C_new")
@@ -79,8 +80,7 @@ def _is_word(text: str) -> bool:
 
 
 def _kind(statement: syntax.Statement) -> str:
-    calculates = isinstance(statement, syntax.Assignment) or statement.name.name == "variants"
-    return "Calculation" if calculates else "Transformation"
+    return "Calculation" if isinstance(statement, syntax.Assignment) else "Transformation"
 
 
 def _statements(spot: Spot, statements: tuple[syntax.Statement, ...], base: int | None = None) -> str:
@@ -111,8 +111,8 @@ def _inline(spot: Spot) -> Iterator[Action]:
         or facts_of(node.span.source).is_broken
     ):
         return
-    if any(isinstance(each, syntax.Operation) and each.name.name == "variants" for each in node.statements):
-        return  # its name is part of the random key
+    if has_variants(node.statements):
+        return
     home = Spot(spot.scene, place.document, place.start, place.end)
     body = _statements(home, node.statements, place.start - node.span.start)
     if "//" in body.rpartition("\n")[2]:

@@ -107,6 +107,8 @@ def test_inline_here_and_everywhere():
 
 def test_variants_belong_to_their_calculation():
     assert refactored("Selection A { C_v<cursor> A; A -> box; }\nCalculation C_v { variants 3; }\n") == {}
+    twice = "Selection A { A -> [ vari<cursor>ants 3; ] B + [ variants 3; ] B; }\nSelection B { B -> [ rotz 360*rand(0) ] box; }\n"
+    assert refactored(twice) == {}
 
 
 # --- bound a recursion
@@ -137,6 +139,20 @@ def test_a_recursion_that_is_entered_elsewhere_gets_no_counter():
     text = "object {{ {} }}\nSelection A {{ A -> [ scale 2 ] B; }}\nSelection <cursor>B {{ B -> box + A; }}\n"
     assert not [each for each in refactored(text.format("A")) if each.startswith("Bound")]
     assert "Selection B { [ rounds = 10 ] B; if (rounds > 0) B -> box + [ --rounds ] A; }" in changed(text.format("B"), "Bound", keeps=False)
+
+
+def test_a_way_round_elsewhere_would_go_on():
+    text = "object { A }\nSelection <cursor>A { A -> box + [ trans 0 0 1 ] B; }\nSelection B { B -> [ trans 1 0 0 ] B + A; }\n"
+    assert not [each for each in refactored(text) if each.startswith("Bound")]
+
+
+def test_no_other_rule_gets_the_else():
+    """`else if (rounds > 0) A -> …; else A -> cone;` would bind the last `else` to the new `if`."""
+    inner = "if (n > 2) A -> box + [ --n; trans 0 0 1 ] A; else A -> [ --n; trans 0 1 0 ] A + sphere;"
+    start = "object { A }\nSelection <cursor>A { [ n = 4 ] A; if (n > 0) "
+    assert not [each for each in refactored(f"{start}{inner} else A -> cone; }}\n") if each.startswith("Bound")]
+    after = changed(f"{start}{inner} }}\n", "Bound")
+    assert "else if (rounds > 0) A -> [ --n; trans 0 1 0 ] [ --rounds ] A + sphere;" in after
 
 
 def test_only_recursions_are_bounded():
