@@ -31,13 +31,14 @@ class TextEdit(NamedTuple):
 
 class Action(NamedTuple):
     """``kind`` is the protocol's: quickfix, refactor.extract, refactor.inline, refactor.rewrite. ``message`` is what a
-    quickfix is for; ``preferred`` says that it is the likely one."""
+    quickfix is for; ``preferred`` says that it is the likely one. ``name`` is defined no longer, or takes other arguments."""
 
     title: str
     kind: str
     edits: tuple[TextEdit, ...]
     preferred: bool = False
     message: Message | None = None
+    name: str = ""
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,7 @@ def parameterised(spot: Spot, node: syntax.Selection) -> Iterator[Action]:
             )
         )
     title = f"Turn into the parameterised symbol {name}({', '.join(names)})"
-    yield Action(title, "refactor.rewrite", tuple(edits))
+    yield Action(title, "refactor.rewrite", tuple(edits), name=name)
 
 
 def _entry(spot: Spot, node: syntax.Selection) -> tuple[dict[str, str], list[TextEdit]] | None:

@@ -123,16 +123,15 @@ def _inline(spot: Spot) -> Iterator[Action]:
     edits = [TextEdit(use.document, use.start, use.end, f"[ {body} ]") for use in uses]
     gone = home.cut(place.start, place.end)
     if len(uses) == 1:
-        yield Action(f"Inline '{node.name.name}'", "refactor.inline", (*edits, gone))
+        yield Action(f"Inline '{node.name.name}'", "refactor.inline", (*edits, gone), name=node.name.name)
         return
     if found[1].role == "read":
         here = tuple(
             edit for edit in edits if edit.document is spot.document and edit.start == found[1].start
         )
         yield Action(f"Inline '{node.name.name}' here", "refactor.inline", here)
-    yield Action(
-        f"Inline '{node.name.name}' everywhere ({len(uses)} places)", "refactor.inline", (*edits, gone)
-    )
+    title = f"Inline '{node.name.name}' everywhere ({len(uses)} places)"
+    yield Action(title, "refactor.inline", (*edits, gone), name=node.name.name)
 
 
 def _is_operator(use: Place) -> bool:

@@ -33,7 +33,16 @@ def _actions(request: Request) -> Iterator[Action]:
         yield from fixes(scene, document, message)
     for message in found[:MAX_MESSAGES]:
         yield from ignoring(scene, document, message)
-    yield from refactorings(scene, document, start, end)
+    for action in refactorings(scene, document, start, end):
+        if not action.name or not _is_used_elsewhere(request, action.name):
+            yield action
+
+
+def _is_used_elsewhere(request: Request, name: str) -> bool:
+    """Whether a scene that shares the definition of ``name`` uses it in a file that isn't part of this one."""
+    scenes = request.workspace.project.scenes_with(name, request.document)
+    own = request.scene.documents
+    return any(use.document not in own for scene in scenes for use in scene.uses(name))
 
 
 def _is_wanted(kind: str, only: list[str] | None) -> bool:

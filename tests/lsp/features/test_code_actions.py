@@ -59,3 +59,21 @@ def test_edits_in_other_files(tmp_path):
     changes = {change["textDocument"]["uri"]: change["edits"] for change in action["edit"]["documentChanges"]}
     assert set(changes) == {editor.uri("main.plsys"), editor.uri("lib.plsys")}
     assert [edit["newText"] for edit in changes[editor.uri("main.plsys")]] == ["[ trans 0 0 1 ]"]
+
+
+def test_what_another_scene_uses_stays(tmp_path):
+    """Neither is what the scene `other` uses taken away, nor are its arguments left behind."""
+    files = {
+        "main.plsys": '#include "lib.plsys"\nobject { Tree }\nSelection Tree { Tree -> T_<cursor>up Leaf; }\n',
+        "lib.plsys": "Transformation T_up { trans 0 0 1; }\nSelection Leaf { [ n = 3 ] Leaf; if (n > 0) Leaf -> box + [ --n; trans 1 0 0 ] Leaf; }\n",
+        "other.plsys": '#include "lib.plsys"\nobject { Leaf }\nobject { Q }\nSelection Q { Q -> T_up Leaf; }\n',
+    }
+    editor = Editor({name: files[name] for name in ("main.plsys", "lib.plsys")}, tmp_path)
+    where = {"range": dict.fromkeys(("start", "end"), editor.cursor["position"]), "context": {}}
+    assert [each["title"] for each in editor.in_file("textDocument/codeAction", "main.plsys", **where)] == ["Inline 'T_up'"]
+    editor.open("other.plsys", files["other.plsys"])
+    assert editor.in_file("textDocument/codeAction", "main.plsys", **where) == []
+    editor.open("lib.plsys", files["lib.plsys"])
+    head = dict.fromkeys(("start", "end"), {"line": 1, "character": 12})
+    found = editor.in_file("textDocument/codeAction", "lib.plsys", range=head, context={})
+    assert not [each for each in found if each["title"].startswith("Turn into")]
