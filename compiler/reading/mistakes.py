@@ -8,6 +8,7 @@ Example: ``first_error(reading, node)`` on ``camera { location @ }`` is the diag
 from __future__ import annotations
 
 import re
+import unicodedata
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -59,6 +60,9 @@ _EXPECTED = {
 # Patterns are compiled when something went wrong: most texts are right.
 # What may stand outside of strings and comments.
 _KNOWN = r"[A-Za-z0-9_\s\"#%()*+,\-./:;<=>?\[\]{}!&|→\u00C0-\u1FFF\u2C00-\uD7FF]"
+
+# So far is looked for the end of a block without a name.
+MAX_BLOCK_BYTES = 1 << 16
 
 # Strings and comments inside broken text, of which only the rest is judged.
 _MASKED = r'(?s)"[^"\r\n]*"|//[^\r\n]*|/\*.*?\*/'
@@ -244,12 +248,19 @@ def unexpected(reading: Reading, node: Node, context: Node | None = None) -> Dia
             return _diagnostic("syntax", _part(reading, node, match), message, hint)
     known = re.compile(_KNOWN)
     for match in re.finditer(r".", text):
+        if match[0].isspace() and not match[0].isascii():
+            message = f"the character U+{ord(match[0]):04X} ({unicodedata.name(match[0], 'white space').lower()}) is no space here"
+            span = _part(reading, node, match)
+            return Diagnostic("syntax", "error", message, span, "write a plain space", mend=" ")
         if not known.match(match[0]):
             shown = f"'{match[0]}'" if match[0].isprintable() else f"U+{ord(match[0]):04X}"
             message = f"the character {shown} has no meaning here"
             return _diagnostic("syntax", _part(reading, node, match), message, "remove it")
     if (opener := _last_open(text)) >= 0:
         start = node.start_byte + len(text[:opener].encode())
+        if text[opener] == "{" and _is_closed(reading, start):
+            hint = "a name stands before it: camera { … }, Selection Tree { … }"
+            return _diagnostic("syntax", Span(reading.source, start, start + 1), "this '{' begins a block without a name", hint)
         rest = re.match(rb"[^;{}\r\n]*", reading.data[node.end_byte :])[0].decode(errors="replace")
         if _last_open(text[opener:] + rest) == 0:
             return never_closed(reading, start, text[opener], _CLOSER_OF[text[opener]])
@@ -262,6 +273,17 @@ def unexpected(reading: Reading, node: Node, context: Node | None = None) -> Dia
     if re.fullmatch(_OPERATOR, match[0]) and re.match(rb"[ \t]*([;)}\],\r\n]|$)", reading.data[span.end :]):
         return _diagnostic("missing", span, f"nothing stands after this '{match[0]}'", hint)
     return _diagnostic("syntax", span, f"'{match[0][:30]}' is unexpected here", hint)
+
+
+def _is_closed(reading: Reading, start: int) -> bool:
+    """Whether the brace at ``start`` is closed further on."""
+    text = re.sub(_MASKED, "", reading.data[start : start + MAX_BLOCK_BYTES].decode(errors="replace"))
+    depth = 0
+    for brace in re.findall(r"[{}]", text):
+        depth += 1 if brace == "{" else -1
+        if depth == 0:
+            return True
+    return False
 
 
 def _last_open(text: str) -> int:

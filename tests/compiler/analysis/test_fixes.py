@@ -41,6 +41,8 @@ FIXTURES = [
     ("unclosed", "Calculation C { n = 1; } /* done\n", "Calculation C { n = 1; } /* done */\n"),
     ("unclosed", "Selection A { A -> (box + disc; }", "Selection A { A -> (box + disc); }"),
     ("unclosed", "Selection A { A -> [ scale 2 box; }", None),
+    ("syntax", "Selection A { A ->\u00a0box; }", "Selection A { A -> box; }"),
+    ("syntax", "Selection A {\u2003A -> box; }", "Selection A { A -> box; }"),
     ("encoding", "Calculation C { n =\0 1; }", "Calculation C { n = 1; }"),
     ("unsupported", "#local A = 1;", "#declare A = 1;"),
     # names
